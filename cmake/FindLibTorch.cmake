@@ -1,0 +1,47 @@
+# Finds LibTorch inside a PyTorch wheel (or an unpacked libtorch) and makes the target LibTorch::LibTorch.
+#
+# The wheel's own TorchConfig.cmake demands a CUDA toolkit at build time. Nothing here needs one: the program
+# uses CUDA only at run time, through LibTorch. Set LIBTORCH_ROOT to the folder that holds include/ and lib/.
+if(NOT LIBTORCH_ROOT)
+  file(GLOB _q3d_torch_candidates "${CMAKE_SOURCE_DIR}/.venv/lib/python3*/site-packages/torch")
+  if(_q3d_torch_candidates)
+    list(GET _q3d_torch_candidates 0 _q3d_torch_root)
+    set(LIBTORCH_ROOT "${_q3d_torch_root}" CACHE PATH "Folder of LibTorch (include/ and lib/)" FORCE)
+  endif()
+endif()
+
+find_path(LIBTORCH_INCLUDE_DIR torch/csrc/api/include/torch/torch.h
+          HINTS "${LIBTORCH_ROOT}/include" NO_DEFAULT_PATH)
+find_library(LIBTORCH_CPU_LIBRARY torch_cpu HINTS "${LIBTORCH_ROOT}/lib" NO_DEFAULT_PATH)
+find_library(LIBTORCH_C10_LIBRARY c10 HINTS "${LIBTORCH_ROOT}/lib" NO_DEFAULT_PATH)
+if(EXISTS "${LIBTORCH_ROOT}/version.py")
+  file(STRINGS "${LIBTORCH_ROOT}/version.py" _q3d_torch_version REGEX "__version__ = ")
+  string(REGEX MATCH "[0-9]+\\.[0-9]+\\.[0-9]+" LIBTORCH_VERSION "${_q3d_torch_version}")
+elseif(EXISTS "${LIBTORCH_ROOT}/build-version")
+  file(READ "${LIBTORCH_ROOT}/build-version" _q3d_torch_version)
+  string(REGEX MATCH "[0-9]+\\.[0-9]+\\.[0-9]+" LIBTORCH_VERSION "${_q3d_torch_version}")
+endif()
+
+include(FindPackageHandleStandardArgs)
+find_package_handle_standard_args(LibTorch
+  REQUIRED_VARS LIBTORCH_INCLUDE_DIR LIBTORCH_CPU_LIBRARY LIBTORCH_C10_LIBRARY
+  VERSION_VAR LIBTORCH_VERSION
+  REASON_FAILURE_MESSAGE "run `make setup`, or pass -DLIBTORCH_ROOT=<folder with include/ and lib/>")
+
+if(LibTorch_FOUND AND NOT TARGET LibTorch::LibTorch)
+  set(_q3d_torch_libs "")
+  foreach(_lib torch torch_cpu torch_cuda c10 c10_cuda)
+    if(EXISTS "${LIBTORCH_ROOT}/lib/lib${_lib}.so")
+      list(APPEND _q3d_torch_libs "${LIBTORCH_ROOT}/lib/lib${_lib}.so")
+    endif()
+  endforeach()
+  list(JOIN _q3d_torch_libs " " _q3d_torch_link)
+  add_library(LibTorch::LibTorch INTERFACE IMPORTED)
+  # Nothing in our objects names a symbol of torch_cuda, so the linker would drop it and no GPU would be found.
+  set_target_properties(LibTorch::LibTorch PROPERTIES
+    INTERFACE_INCLUDE_DIRECTORIES "${LIBTORCH_INCLUDE_DIR};${LIBTORCH_INCLUDE_DIR}/torch/csrc/api/include"
+    INTERFACE_SYSTEM_INCLUDE_DIRECTORIES "${LIBTORCH_INCLUDE_DIR};${LIBTORCH_INCLUDE_DIR}/torch/csrc/api/include"
+    INTERFACE_LINK_LIBRARIES "-Wl,--push-state,--no-as-needed ${_q3d_torch_link} -Wl,--pop-state"
+    INTERFACE_LINK_OPTIONS "-Wl,-rpath,${LIBTORCH_ROOT}/lib")
+  unset(_q3d_torch_libs)
+endif()

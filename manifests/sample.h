@@ -1,0 +1,104 @@
+// The sample record: what every loader produces and every stage consumes.
+//
+// It is a plain value without tensors, images or library types, so that loaders, filters and the pipeline can
+// share it without sharing their dependencies.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace q3d::manifests {
+
+inline constexpr int kNumKeypoints = 26;  // Animal3D / SMAL keypoints
+inline constexpr int kNumJoints = 35;     // SMAL joints; joint 0 carries the global orientation
+inline constexpr int kNumBetas = 41;      // SMAL shape coefficients
+
+// One annotated keypoint in pixels of the source image as stored (EXIF orientation never applied), origin
+// top-left. `v` is the file's own value, kept verbatim (-1, 0, 1, 2, or a likelihood). `weight` is what the
+// toolkit uses: 0 when the keypoint is not labelled, else 1 or the likelihood. Only weight > 0 is visible.
+struct Keypoint {
+  double x_px = 0.0;
+  double y_px = 0.0;
+  float v = 0.0F;
+  float weight = 0.0F;
+};
+using Keypoints = std::array<Keypoint, kNumKeypoints>;
+
+struct Box {  // pixels of the source image, top-left origin, width and height
+  double x_px = 0.0;
+  double y_px = 0.0;
+  double w_px = 0.0;
+  double h_px = 0.0;
+};
+
+// The five families of the SMAL shape space; `none` for every other animal.
+enum class Family : std::int8_t { none = -1, felidae = 0, canidae, equidae, bovidae, hippopotamidae };
+std::string_view to_string(Family family);
+
+// 3D truth as an annotation file gives it (absent for 2D-only sets).
+struct BodyTruth {
+  bool has_pose = false;   // not all 105 numbers are zero
+  bool has_betas = false;  // not all 41 numbers are zero
+  bool has_keypoints_3d = false;
+  std::array<float, kNumJoints * 3> pose_axis_angle{};  // rad; [0:3] is the global orientation
+  std::array<float, kNumBetas> betas{};
+  std::array<float, 3> trans{};                         // SMAL units, camera frame, focal 1000 px at 256 px
+  std::array<float, kNumKeypoints * 3> keypoints_3d{};  // SMAL units (about metres), y down
+};
+
+// Why a sample is failed or discarded. The names are stable: they are written into lists and shards.
+enum class Reason : std::uint8_t {
+  none,
+  // failed while reading the annotation
+  box_missing,
+  box_not_finite,
+  box_zero_size,
+  box_outside_image,
+  keypoints_missing,
+  keypoints_wrong_length,
+  keypoints_not_finite,
+  no_visible_keypoints,
+  record_malformed,
+  image_not_listed,
+  // failed while reading the picture
+  image_missing,
+  image_empty,
+  image_is_lfs_pointer,
+  image_not_an_image,
+  image_truncated,
+  image_too_large,
+  path_escapes_root,
+  // failed in the network
+  prediction_not_finite,
+  // discarded by the fidelity rule
+  error_too_large,  // L_proj >= tau_high
+  gain_too_small,   // relative gain < delta within the first ten iterations
+  // discarded by the user
+  vetoed,
+};
+std::string_view to_string(Reason reason);
+Reason reason_from_string(std::string_view name);  // throws std::invalid_argument on an unknown name
+
+struct SampleRecord {
+  std::string id;       // dataset/split/image#annotation, unique within a build
+  std::string dataset;  // name from the config
+  std::string split;    // train, test, ...
+  std::string source;   // sub-dataset where the file says (SuperAnimal's source_dataset), else empty
+  std::string species;  // normalised: lower case, spaces; empty when unknown
+  Family family = Family::none;
+  std::string image_path;  // absolute, resolved; empty when it could not be resolved
+  std::string image_ref;   // as the annotation file names it
+  std::string mask_path;   // absolute; empty when there is none
+  int width_px = 0;        // as the annotation says; 0 when it does not
+  int height_px = 0;
+  Box box;
+  Keypoints keypoints;
+  std::optional<BodyTruth> truth;
+  Reason failure = Reason::none;  // set by a loader for a record that cannot be used
+  std::string failure_detail;     // got / expected, for people
+};
+
+}  // namespace q3d::manifests

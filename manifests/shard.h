@@ -1,0 +1,68 @@
+// The shard: schema 1 of the published dataset, its writer and its reader. docs/shard-format.md describes it.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "manifests/sample.h"
+#include "manifests/verdict.h"
+
+namespace q3d::manifests {
+
+inline constexpr int kShardSchema = 1;
+
+// One labelled sample. Pixel quantities are of the source image unless they say otherwise; crop units are
+// those of the network's crop (side 1, range [-0.5, 0.5]).
+struct ShardSample {
+  SampleRecord record;
+  std::string image_sha256;  // digest of the source file
+  LabelKind label_kind = LabelKind::retained;
+  Judgement judgement;
+
+  // Source image and stored crop. The stored crop covers `crop_scale` times the box's longer side; it is
+  // absent (0 bytes) when the shard only refers to images.
+  int image_width_px = 0;
+  int image_height_px = 0;
+  std::vector<std::byte> crop;       // encoded picture (JPEG or PNG), RGB
+  std::vector<std::byte> crop_mask;  // encoded 8-bit PNG, empty when there is no mask
+  int crop_side_px = 0;
+  std::array<double, 6> crop_from_image{};  // 2x3 affine, image px -> stored-crop px
+  std::array<double, 3> patch_box{};        // centre x, centre y, side: the network's square crop, image px
+
+  // The label. Rotations are matrices; trans and keypoints_3d are in the camera frame of the 256-px crop
+  // (x right, y down, z forward), SMAL units, focal 1000 px at 256 px.
+  bool has_pose = false;
+  bool has_betas = false;
+  bool has_keypoints_3d = false;
+  std::array<float, kNumJoints * 9> pose{};  // (35, 3, 3), joint 0 = global orientation
+  std::array<float, kNumBetas> betas{};
+  std::array<float, 3> camera{};  // weak-perspective (s, tx, ty)
+  std::array<float, 3> trans{};   // (tx, ty, 2 f / (256 s))
+  std::array<float, kNumKeypoints * 3> keypoints_3d{};
+  std::array<float, kNumKeypoints * 2> projected_2d{};  // keypoints of the body, crop units
+};
+
+struct ShardHeader {
+  int schema = kShardSchema;
+  std::string dataset;  // name of the build
+  std::string version;  // config key of the build
+  std::int64_t unit = 0;
+  std::string image_encoding;  // "jpeg", "png" or "reference"
+};
+
+// Writes one shard atomically and returns its SHA-256. Throws std::runtime_error.
+std::string write_shard(const std::filesystem::path& path, const ShardHeader& header,
+                        const std::vector<ShardSample>& samples);
+
+struct Shard {
+  ShardHeader header;
+  std::vector<ShardSample> samples;
+};
+// Checks magic, schema and completeness, in that order, and refuses what it does not know.
+// Throws std::runtime_error naming path, dataset, got and expected.
+Shard read_shard(const std::filesystem::path& path);
+
+}  // namespace q3d::manifests

@@ -1,0 +1,34 @@
+// The verdict on one candidate: where it ended, why, and the numbers that decided it.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <string_view>
+
+#include "manifests/sample.h"
+
+namespace q3d::manifests {
+
+enum class Verdict : std::uint8_t { retained, refined, discarded, failed };
+std::string_view to_string(Verdict verdict);
+Verdict verdict_from_string(std::string_view name);  // throws std::invalid_argument on an unknown name
+
+// What a label in a shard is. `truth` comes from the annotation file, `retained` straight from the network,
+// `refined` from test-time adaptation; `two_d_only` has keypoints and no body.
+enum class LabelKind : std::uint8_t { truth, retained, refined, two_d_only };
+std::string_view to_string(LabelKind kind);
+
+struct Judgement {
+  Verdict verdict = Verdict::failed;
+  Reason reason = Reason::none;
+  std::string detail;  // for people; empty for kept samples
+  // L_proj in crop units (crop side = 1); NaN when it was never computed.
+  double initial_error = std::numeric_limits<double>::quiet_NaN();
+  double final_error = std::numeric_limits<double>::quiet_NaN();
+  double gain = std::numeric_limits<double>::quiet_NaN();  // relative gain within the first ten iterations
+  int iterations = 0;                                      // adaptation steps taken
+  int best_iteration = 0;  // the iterate that was kept; 0 = the prediction itself
+};
+
+}  // namespace q3d::manifests

@@ -1,0 +1,40 @@
+// Sizes and switches of the PRIMA network, and their JSON form.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+
+#include <cstdint>
+#include <string>
+
+namespace q3d::model {
+
+struct PrimaConfig {
+  // ViT backbone
+  std::int64_t embed_dim = 1280;
+  std::int64_t depth = 32;
+  std::int64_t heads = 16;
+  std::int64_t mlp_ratio = 4;
+  // BioCLIP visual encoder
+  std::int64_t clip_width = 768;
+  std::int64_t clip_layers = 12;
+  std::int64_t clip_heads = 12;
+  std::int64_t clip_out = 512;
+  bool clip_quick_gelu = false;
+  // keypoint-aware decoder
+  std::int64_t dec_dim = 1280;
+  std::int64_t dec_layers = 6;
+  std::int64_t dec_heads = 8;
+  std::int64_t dec_ffn = 5120;
+  std::int64_t ief_iterations = 1;
+  double focal_px = 1000.0;  // at the 256-px crop
+};
+
+// Named sizes: "vith" (the paper's), "small" and "tiny". Throws std::invalid_argument naming the known ones.
+PrimaConfig named_config(const std::string& name);
+
+// Throws std::invalid_argument on an unknown key (naming the nearest known one), a wrong type or an
+// impossible size (heads that do not divide the width, ...).
+PrimaConfig config_from_json(const nlohmann::json& json);
+nlohmann::json to_json(const PrimaConfig& config);
+
+}  // namespace q3d::model

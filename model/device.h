@@ -1,0 +1,23 @@
+// The one place that knows CUDA exists.
+#pragma once
+
+#include <torch/torch.h>
+
+#include <string>
+
+namespace q3d::model {
+
+struct DeviceChoice {
+  torch::Device device = torch::kCPU;
+  std::string description;  // "cpu (2 threads)", "cuda:0 NVIDIA H100 80GB HBM3"
+  std::string warning;      // a GPU that is present but cannot be used, and why; else empty
+};
+
+// "auto" (a usable GPU, else the CPU), "cpu", "cuda", "cuda:I". Throws std::invalid_argument for another word
+// and std::runtime_error when a CUDA device was asked for and cannot be used.
+DeviceChoice choose_device(const std::string& name);
+
+// Reproducible kernels, and the number of threads a CPU operator may use.
+void configure_compute(int threads);
+
+}  // namespace q3d::model

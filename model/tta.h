@@ -1,0 +1,50 @@
+// Test-time adaptation: per-instance refinement of the keypoint embeddings and the three regression heads
+// (4.5 M parameters at full size) against annotated 2D keypoints. Paper section "Test-time Adaptation";
+// official code: demo_tta.tta_optimize. Batched: each instance has its own parameters, Adam moments and
+// stopping rule.
+#pragma once
+
+#include <torch/torch.h>
+
+#include <vector>
+
+#include "model/prima.h"
+
+namespace q3d::model {
+
+enum class TtaObjective {
+  paper,  // 5.0 * aux + 0.5 * reprojection, mean absolute error over visible keypoints and both coordinates
+  demo,   // sum of squared reprojection error / (visible + 1e-6)
+};
+
+struct TtaOptions {
+  TtaObjective objective = TtaObjective::paper;
+  double learning_rate = 1e-6;
+  double aux_weight = 5.0;
+  double reproj_weight = 0.5;
+};
+
+// When one instance stops. All fields are per instance, so that its result does not depend on its batch mates
+// beyond rounding.
+struct TtaSchedule {
+  int iterations = 10;
+  double stop_below = 0.0;  // stop as soon as L_proj is below this (tau_low); 0 = never
+  double min_gain = 0.0;  // give up after `gain_window` iterations when the relative gain is less; 0 = never
+  int gain_window = 10;
+};
+
+struct TtaResult {
+  Prediction best;                          // the iterate of least L_proj, iteration 0 included
+  Prediction last;                          // the iterate after the last step taken
+  std::vector<std::vector<double>> l_proj;  // per instance: L_proj of iterates 0..n in crop units
+  std::vector<std::vector<double>> loss;    // per instance: the objective at iterates 0..n
+  std::vector<int> best_iteration;
+};
+
+// keypoints (B, 26, 3): x, y in crop units and a weight; visible iff weight > 0 (the value is not a weight
+// here). An instance without visible keypoints is left as it is. Throws std::invalid_argument on shapes that
+// disagree.
+TtaResult adapt(const Prima& prima, const ImageFeatures& features, const torch::Tensor& keypoints,
+                const std::vector<TtaSchedule>& schedules, const TtaOptions& options);
+
+}  // namespace q3d::model
