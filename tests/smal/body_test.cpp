@@ -145,7 +145,7 @@ class DamagedAsset : public ::testing::TestWithParam<Damage> {};
 TEST_P(DamagedAsset, IsRefusedByName) {
   SmalAsset asset = good_asset();
   for (torch::Tensor* tensor : {&asset.v_template, &asset.parents, &asset.lbs_weights, &asset.j_regressor}) {
-    *tensor = tensor->clone();  // the file's pages are read-only
+    *tensor = tensor->clone();  // other tests share them
   }
   ASSERT_NO_THROW(check_asset(asset, "test"));
   GetParam().apply(asset);
