@@ -104,8 +104,7 @@ struct Network::Impl {
         options(tta_options(tta)),
         device(choose_device(network.device)),
         prima(model::Prima::load(network.checkpoint, network.smal_asset, device.device,
-                                 network.dtype == "bfloat16" ? torch::kBFloat16 : torch::kFloat32)),
-        key(device.device.is_cpu() ? fmt::format("cpu-{}", threads) : "cuda") {}
+                                 network.dtype == "bfloat16" ? torch::kBFloat16 : torch::kFloat32)) {}
 
   // OpenMP's thread count belongs to the calling thread, so it is set wherever work begins.
   void begin() const { model::configure_compute(threads); }
@@ -116,7 +115,6 @@ struct Network::Impl {
   model::TtaOptions options;
   model::DeviceChoice device;
   model::Prima prima;
-  std::string key;
 };
 
 Network::Network(const NetworkConfig& network, const TtaConfig& tta)
@@ -125,7 +123,11 @@ Network::~Network() = default;
 
 const std::string& Network::device_description() const { return impl_->device.description; }
 const std::string& Network::device_warning() const { return impl_->device.warning; }
-const std::string& Network::device_key() const { return impl_->key; }
+
+std::string device_key(const NetworkConfig& network) {
+  const bool on_cpu = choose_device(network.device).device.is_cpu();
+  return on_cpu ? fmt::format("cpu-{}", resolved_threads(network.compute_threads)) : "cuda";
+}
 
 std::vector<BodyPrediction> Network::predict(std::span<const PatchView> patches) {
   impl_->begin();

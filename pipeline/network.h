@@ -63,13 +63,15 @@ class Network {
   const std::string& device_description() const;
   // A GPU that is present but cannot be used, and why; else empty.
   const std::string& device_warning() const;
-  // What of the device decides the bits: "cpu-2", "cuda": part of the stage keys.
-  const std::string& device_key() const;
 
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
+
+// What of device and threads decides the bits: "cpu-2", "cuda". Part of the stage keys; loads nothing.
+// Throws as Network's constructor does.
+std::string device_key(const NetworkConfig& network);
 
 // A seeded checkpoint of a named size ("vith", "small", "tiny"). Throws ConfigError for another name.
 void write_initial_checkpoint(const std::filesystem::path& path, const std::string& size, std::uint64_t seed);
