@@ -29,7 +29,8 @@ class UnitBuilder {
         refinements_(workspace.out(), "refine", keys.refine),
         shards_(workspace.out(), "shards", keys.shards),
         judgements_(workspace.ingest().candidates.size()),
-        progress_("candidates", static_cast<std::int64_t>(workspace.ingest().candidates.size()), workspace.quiet()) {}
+        progress_("candidates", static_cast<std::int64_t>(workspace.ingest().candidates.size()),
+                  workspace.quiet()) {}
 
   void run() {
     UnitFlow flow;
@@ -38,7 +39,7 @@ class UnitBuilder {
     flow.decode = [this](UnitWork& work) { decode_unit(work, config_.shards, &thresholds_); };
     flow.compute = [this](UnitWork& work) { compute(work); };
     flow.write = [this](UnitWork& work) { write(work); };
-    pipeline::run(flow);
+    pipeline::run(flow, workspace_.device());
   }
 
   const std::vector<manifests::Judgement>& judgements() const { return judgements_; }
@@ -86,9 +87,9 @@ class UnitBuilder {
     header.version = keys_.shards;
     header.unit = work.unit->index;
     header.image_encoding = config_.shards.images;
-    shards_.save(*work.unit, static_cast<std::int64_t>(samples.size()), [&](const std::filesystem::path& path) {
-      return manifests::write_shard(path, header, samples);
-    });
+    shards_.save(
+        *work.unit, static_cast<std::int64_t>(samples.size()),
+        [&](const std::filesystem::path& path) { return manifests::write_shard(path, header, samples); });
   }
 
   const BuildConfig& config_;
@@ -117,8 +118,8 @@ BuildSummary build(const BuildConfig& config, const RunOptions& options) {
   if (!summary.was_up_to_date) {
     UnitBuilder units(config, limits, keys, workspace);
     units.run();
-    const DatasetInputs inputs{&config,           &limits, &workspace.ingest(), &workspace.assets(), &keys,
-                               workspace.device_key()};
+    const DatasetInputs inputs{
+        &config, &limits, &workspace.ingest(), &workspace.assets(), &keys, workspace.device_key()};
     publish(summary.folder, inputs, units.judgements(), units.shards());
   }
   point_latest(options.out, summary.folder);

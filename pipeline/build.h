@@ -22,8 +22,8 @@ struct BuildSummary {
   bool was_up_to_date = false;
 };
 
-// Makes <out>/<name>-<key>/ and points <out>/latest at it; goes on where an earlier run ended. Throws ConfigError,
-// std::runtime_error, Interrupted.
+// Makes <out>/<name>-<key>/ and points <out>/latest at it; goes on where an earlier run ended. Throws
+// ConfigError, std::runtime_error, Interrupted.
 BuildSummary build(const BuildConfig& config, const RunOptions& options);
 
 }  // namespace q3d::pipeline

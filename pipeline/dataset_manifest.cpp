@@ -86,7 +86,9 @@ ordered_json statistics(const Ingest& ingest, const std::vector<manifests::Judge
 }
 
 // Shortest text that reads back as the same number; empty for NaN.
-std::string number(double value) { return std::isnan(value) ? std::string() : fmt::format("{}", value); }
+std::string number(double value) {
+  return std::isnan(value) ? std::string() : fmt::format("{}", value);
+}
 
 std::string csv_field(const std::string& text) {
   if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
@@ -100,10 +102,18 @@ std::string csv_field(const std::string& text) {
 void Counts::add(Verdict verdict) {
   ++candidates;
   switch (verdict) {
-    case Verdict::retained: ++retained; break;
-    case Verdict::refined: ++refined; break;
-    case Verdict::discarded: ++discarded; break;
-    case Verdict::failed: ++failed; break;
+    case Verdict::retained:
+      ++retained;
+      break;
+    case Verdict::refined:
+      ++refined;
+      break;
+    case Verdict::discarded:
+      ++discarded;
+      break;
+    case Verdict::failed:
+      ++failed;
+      break;
   }
 }
 
@@ -126,40 +136,40 @@ std::string dataset_json(const DatasetInputs& inputs, const std::vector<manifest
                           {"sha256", shard.sha256}});
   }
   const StageKeys& keys = *inputs.keys;
-  const ordered_json document = {
-      {"format", kDatasetFormat},
-      {"schema", manifests::kShardSchema},
-      {"name", inputs.config->name},
-      {"version", inputs.config->version},
-      {"key", keys.dataset},
-      {"content_id", content_id(shards)},
-      {"toolkit", kToolkitVersion},
-      {"counts", to_json(counts)},
-      {"thresholds",
-       {{"tau_low", inputs.thresholds->tau_low},
-        {"tau_high", inputs.thresholds->tau_high},
-        {"delta", inputs.thresholds->delta}}},
-      {"statistics", statistics(*inputs.ingest, judgements)},
-      {"provenance",
-       {{"config", inputs.config->as_written},
-        {"annotations", inputs.ingest->annotation_digests},
-        {"checkpoint_sha256", inputs.assets->checkpoint},
-        {"smal_asset_sha256", inputs.assets->smal_asset},
-        {"device", inputs.device_key},
-        {"stage_keys",
-         {{"ingest", keys.ingest},
-          {"predict", keys.predict},
-          {"fidelity", keys.fidelity},
-          {"refine", keys.refine},
-          {"shards", keys.shards}}}}},
-      {"verdicts", {{"file", "verdicts.csv"}, {"sha256", verdicts_sha256}}},
-      {"shards", shard_list}};
+  const ordered_json document = {{"format", kDatasetFormat},
+                                 {"schema", manifests::kShardSchema},
+                                 {"name", inputs.config->name},
+                                 {"version", inputs.config->version},
+                                 {"key", keys.dataset},
+                                 {"content_id", content_id(shards)},
+                                 {"toolkit", kToolkitVersion},
+                                 {"counts", to_json(counts)},
+                                 {"thresholds",
+                                  {{"tau_low", inputs.thresholds->tau_low},
+                                   {"tau_high", inputs.thresholds->tau_high},
+                                   {"delta", inputs.thresholds->delta}}},
+                                 {"statistics", statistics(*inputs.ingest, judgements)},
+                                 {"provenance",
+                                  {{"config", inputs.config->as_written},
+                                   {"annotations", inputs.ingest->annotation_digests},
+                                   {"checkpoint_sha256", inputs.assets->checkpoint},
+                                   {"smal_asset_sha256", inputs.assets->smal_asset},
+                                   {"device", inputs.device_key},
+                                   {"stage_keys",
+                                    {{"ingest", keys.ingest},
+                                     {"predict", keys.predict},
+                                     {"fidelity", keys.fidelity},
+                                     {"refine", keys.refine},
+                                     {"shards", keys.shards}}}}},
+                                 {"verdicts", {{"file", "verdicts.csv"}, {"sha256", verdicts_sha256}}},
+                                 {"shards", shard_list}};
   return document.dump(2) + "\n";
 }
 
 std::string verdicts_csv(const Ingest& ingest, const std::vector<manifests::Judgement>& judgements) {
   std::string text =
-      "id,verdict,reason,initial_error,final_error,gain,iterations,best_iteration,dataset,split,source,species,family,"
+      "id,verdict,reason,initial_error,final_error,gain,iterations,best_iteration,dataset,split,source,"
+      "species,family,"
       "shard,row,image_sha256,detail\n";
   for (const Unit& unit : ingest.units) {
     std::int64_t row = 0;
@@ -168,14 +178,15 @@ std::string verdicts_csv(const Ingest& ingest, const std::vector<manifests::Judg
       const manifests::Judgement& judgement = judgements[i];
       const bool kept = judgement.verdict == Verdict::retained || judgement.verdict == Verdict::refined;
       const bool judged = !std::isnan(judgement.initial_error);
-      text += fmt::format(
-          "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", csv_field(record.id),
-          manifests::to_string(judgement.verdict), manifests::to_string(judgement.reason),
-          number(judgement.initial_error), number(judgement.final_error), number(judgement.gain),
-          judged ? std::to_string(judgement.iterations) : "", judged ? std::to_string(judgement.best_iteration) : "",
-          csv_field(record.dataset), csv_field(record.split), csv_field(record.source), csv_field(record.species),
-          manifests::to_string(record.family), kept ? std::to_string(unit.index) : "",
-          kept ? std::to_string(row) : "", ingest.candidates[i].image_sha256, csv_field(judgement.detail));
+      text += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", csv_field(record.id),
+                          manifests::to_string(judgement.verdict), manifests::to_string(judgement.reason),
+                          number(judgement.initial_error), number(judgement.final_error),
+                          number(judgement.gain), judged ? std::to_string(judgement.iterations) : "",
+                          judged ? std::to_string(judgement.best_iteration) : "", csv_field(record.dataset),
+                          csv_field(record.split), csv_field(record.source), csv_field(record.species),
+                          manifests::to_string(record.family), kept ? std::to_string(unit.index) : "",
+                          kept ? std::to_string(row) : "", ingest.candidates[i].image_sha256,
+                          csv_field(judgement.detail));
       if (kept) ++row;
     }
   }
@@ -186,9 +197,10 @@ std::filesystem::path dataset_folder(const std::filesystem::path& given) {
   for (const auto& folder : {given, given / "latest"}) {
     if (std::filesystem::exists(folder / "dataset.json")) return folder;
   }
-  throw std::runtime_error(fmt::format("{}: expected a dataset folder (with dataset.json) or an output folder of "
-                                       "`build` (with latest/dataset.json)",
-                                       given.string()));
+  throw std::runtime_error(
+      fmt::format("{}: expected a dataset folder (with dataset.json) or an output folder of "
+                  "`build` (with latest/dataset.json)",
+                  given.string()));
 }
 
 DatasetManifest read_dataset_manifest(const std::filesystem::path& given) {
@@ -196,14 +208,16 @@ DatasetManifest read_dataset_manifest(const std::filesystem::path& given) {
   try {
     const json document = json::parse(manifests::read_file(file));
     if (document.at("format") != kDatasetFormat) {
-      throw std::runtime_error(fmt::format("format is {}, expected {}", document.at("format").dump(), kDatasetFormat));
+      throw std::runtime_error(
+          fmt::format("format is {}, expected {}", document.at("format").dump(), kDatasetFormat));
     }
     DatasetManifest manifest;
     manifest.schema = document.at("schema").get<int>();
     if (manifest.schema != manifests::kShardSchema) {
-      throw std::runtime_error(fmt::format("schema is {}, this toolkit reads {}; use the toolkit version that wrote it "
-                                           "({})",
-                                           manifest.schema, manifests::kShardSchema, document.value("toolkit", "?")));
+      throw std::runtime_error(
+          fmt::format("schema is {}, this toolkit reads {}; use the toolkit version that wrote it "
+                      "({})",
+                      manifest.schema, manifests::kShardSchema, document.value("toolkit", "?")));
     }
     manifest.name = document.at("name").get<std::string>();
     manifest.version = document.at("version").get<std::string>();
@@ -214,6 +228,7 @@ DatasetManifest read_dataset_manifest(const std::filesystem::path& given) {
                        counts.at("refined").get<std::int64_t>(), counts.at("discarded").get<std::int64_t>(),
                        counts.at("failed").get<std::int64_t>()};
     manifest.verdicts_sha256 = document.at("verdicts").at("sha256").get<std::string>();
+    manifest.reasons = document.at("statistics").at("reasons").get<std::map<std::string, std::int64_t>>();
     for (const json& shard : document.at("shards")) {
       manifest.shards.push_back({shard.at("file").get<std::string>(), shard.at("sha256").get<std::string>(),
                                  shard.at("bytes").get<std::int64_t>(), shard.at("rows").get<std::int64_t>(),

@@ -1,5 +1,5 @@
-// The finished dataset's own files: dataset.json (what it is and where it came from) and verdicts.csv (what became of
-// every candidate).
+// The finished dataset's own files: dataset.json (what it is and where it came from) and verdicts.csv (what
+// became of every candidate).
 #pragma once
 
 #include <cstdint>
@@ -44,6 +44,7 @@ struct DatasetManifest {
   Counts counts;
   std::vector<ShardEntry> shards;
   std::string verdicts_sha256;
+  std::map<std::string, std::int64_t> reasons;  // of the discarded and the failed
 };
 
 // SHA-256 over the shards' digests, one a line, in unit order.
@@ -62,7 +63,8 @@ struct DatasetInputs {
 std::string dataset_json(const DatasetInputs& inputs, const std::vector<manifests::Judgement>& judgements,
                          const std::vector<ShardEntry>& shards, const std::string& verdicts_sha256);
 
-// Text of verdicts.csv: a header and one line a candidate in ingest order. Shard and row are those of the kept ones.
+// Text of verdicts.csv: a header and one line a candidate in ingest order. Shard and row are those of the
+// kept ones.
 std::string verdicts_csv(const Ingest& ingest, const std::vector<manifests::Judgement>& judgements);
 
 // Reads dataset.json of a dataset's folder, or of the newest one (`latest`) of an output folder.

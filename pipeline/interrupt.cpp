@@ -13,13 +13,16 @@ namespace {
 constexpr unsigned kGraceSeconds = 8;
 volatile std::sig_atomic_t signals_seen = 0;
 
-void leave_at_once(int) { _exit(130); }
+void leave_at_once(int) {
+  _exit(130);
+}
 
 // Async-signal-safe: write, alarm and _exit only.
 void on_signal(int) {
   if (signals_seen != 0) _exit(130);
   signals_seen = 1;
-  const char text[] = "\ninterrupted: dropping the open unit (finished units stay; run the same command to go on)\n";
+  const char text[] =
+      "\ninterrupted: dropping the open unit (finished units stay; run the same command to go on)\n";
   const ssize_t written = write(STDERR_FILENO, text, std::strlen(text));
   static_cast<void>(written);
   alarm(kGraceSeconds);
@@ -37,7 +40,9 @@ void install_interrupt_handlers() {
   sigaction(SIGALRM, &last, nullptr);
 }
 
-bool interrupted() { return signals_seen != 0; }
+bool interrupted() {
+  return signals_seen != 0;
+}
 
 void throw_if_interrupted() {
   if (interrupted()) throw Interrupted("interrupted");

@@ -13,7 +13,8 @@ namespace fs = std::filesystem;
 
 constexpr fs::perms kReadOnly = fs::perms::owner_read | fs::perms::group_read | fs::perms::others_read;
 
-// A hard link where the file system has them, so that versions that share a shard share its bytes; else a copy.
+// A hard link where the file system has them, so that versions that share a shard share its bytes; else a
+// copy.
 void link_or_copy(const fs::path& from, const fs::path& to) {
   std::error_code error;
   fs::remove(to, error);
@@ -50,10 +51,11 @@ void check_sums(const Ingest& ingest, const std::vector<manifests::Judgement>& j
   if (counts.candidates != candidates ||
       counts.retained + counts.refined + counts.discarded + counts.failed != candidates ||
       counts.retained + counts.refined != rows) {
-    throw std::runtime_error(fmt::format(
-        "the books do not balance: {} candidates, {} retained + {} refined + {} discarded + {} failed, {} rows in "
-        "shards",
-        candidates, counts.retained, counts.refined, counts.discarded, counts.failed, rows));
+    throw std::runtime_error(
+        fmt::format("the books do not balance: {} candidates, {} retained + {} refined + {} discarded + {} "
+                    "failed, {} rows in "
+                    "shards",
+                    candidates, counts.retained, counts.refined, counts.discarded, counts.failed, rows));
   }
 }
 
@@ -67,13 +69,15 @@ bool is_published(const fs::path& folder, const StageKeys& keys) {
   if (!fs::exists(folder / "dataset.json")) return false;
   const DatasetManifest manifest = read_dataset_manifest(folder);
   if (manifest.key != keys.dataset) {
-    throw std::runtime_error(fmt::format("{}: holds a dataset with key {}, expected {}; a finished dataset is never "
-                                         "written over. Build into another folder",
-                                         folder.string(), manifest.key, keys.dataset));
+    throw std::runtime_error(
+        fmt::format("{}: holds a dataset with key {}, expected {}; a finished dataset is never "
+                    "written over. Build into another folder",
+                    folder.string(), manifest.key, keys.dataset));
   }
   for (const ShardEntry& shard : manifest.shards) {
     std::error_code error;
-    if (static_cast<std::int64_t>(fs::file_size(folder / shard.file, error)) != shard.bytes || error) return false;
+    if (static_cast<std::int64_t>(fs::file_size(folder / shard.file, error)) != shard.bytes || error)
+      return false;
   }
   return true;
 }

@@ -17,8 +17,8 @@ std::filesystem::path version_folder(const std::filesystem::path& out, const Bui
 // Throws std::runtime_error when the folder holds a dataset of another key.
 bool is_published(const std::filesystem::path& folder, const StageKeys& keys);
 
-// Links the shards into `folder`, writes verdicts.csv and, last, dataset.json. Throws std::runtime_error when the
-// verdicts do not add up to the candidates or a unit has no shard.
+// Links the shards into `folder`, writes verdicts.csv and, last, dataset.json. Throws std::runtime_error when
+// the verdicts do not add up to the candidates or a unit has no shard.
 void publish(const std::filesystem::path& folder, const DatasetInputs& inputs,
              const std::vector<manifests::Judgement>& judgements, const StageStore& shards);
 

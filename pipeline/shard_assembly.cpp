@@ -45,10 +45,10 @@ std::vector<ShardSample> shard_samples(const UnitWork& work) {
     if (judgement.verdict != Verdict::retained && judgement.verdict != Verdict::refined) continue;
     if (!work.decoded[i].decoded) {
       // The picture was readable when it was predicted; a label without its picture must not be written.
-      throw std::runtime_error(fmt::format("{}: the picture {} could be read before and cannot now ({}); put it back "
-                                           "and build again",
-                                           work.candidates[i].record.id, work.candidates[i].record.image_path,
-                                           work.decoded[i].detail));
+      throw std::runtime_error(fmt::format(
+          "{}: the picture {} could be read before and cannot now ({}); put it back "
+          "and build again",
+          work.candidates[i].record.id, work.candidates[i].record.image_path, work.decoded[i].detail));
     }
     ShardSample& sample = samples.emplace_back();
     sample.record = work.candidates[i].record;

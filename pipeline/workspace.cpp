@@ -17,7 +17,8 @@ std::filesystem::path made(const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error) {
-    throw std::runtime_error(fmt::format("{}: cannot make the output folder: {}", folder.string(), error.message()));
+    throw std::runtime_error(
+        fmt::format("{}: cannot make the output folder: {}", folder.string(), error.message()));
   }
   return folder;
 }

@@ -10,6 +10,7 @@
 #include "manifests/digest.h"
 #include "manifests/lock.h"
 #include "pipeline/build.h"
+#include "pipeline/device_worker.h"
 #include "pipeline/ingest.h"
 #include "pipeline/network.h"
 #include "pipeline/stages.h"
@@ -18,8 +19,8 @@ namespace q3d::pipeline {
 
 class Workspace {
  public:
-  // Takes the folder's lock, digests the assets and ingests the datasets. Throws ConfigError, std::runtime_error,
-  // Interrupted.
+  // Takes the folder's lock, digests the assets and ingests the datasets. Throws ConfigError,
+  // std::runtime_error, Interrupted.
   Workspace(const BuildConfig& config, const RunOptions& options);
 
   const std::filesystem::path& out() const { return options_.out; }
@@ -28,7 +29,9 @@ class Workspace {
   const std::string& device_key() const { return device_key_; }
   bool quiet() const { return options_.quiet; }
 
-  // Loaded at the first call, which must come from the thread that computes.
+  // The thread on which the network lives.
+  DeviceWorker& device() { return device_; }
+  // Loaded at the first call; call it on device()'s thread only.
   Network& network();
 
  private:
@@ -41,6 +44,7 @@ class Workspace {
   std::string device_key_;
   Ingest ingest_;
   std::unique_ptr<Network> network_;
+  DeviceWorker device_;
 };
 
 }  // namespace q3d::pipeline
