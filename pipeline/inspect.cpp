@@ -42,6 +42,27 @@ ordered_json describe_judgement(const manifests::Judgement& judgement) {
           {"best_iteration", judgement.best_iteration}};
 }
 
+ordered_json describe_whole(const fs::path& shard, const manifests::ShardSample& sample) {
+  nlohmann::json record;
+  manifests::to_json(record, sample.record);
+  return {{"shard", shard.string()},
+          {"label", manifests::to_string(sample.label_kind)},
+          {"judgement", describe_judgement(sample.judgement)},
+          {"image_sha256", sample.image_sha256},
+          {"image_size_px", {sample.image_width_px, sample.image_height_px}},
+          {"stored_crop",
+           {{"side_px", sample.crop_side_px},
+            {"bytes", sample.crop.size()},
+            {"from_image", sample.crop_from_image}}},
+          {"camera", sample.camera},
+          {"trans", sample.trans},
+          {"betas", sample.betas},
+          {"pose", sample.pose},
+          {"keypoints_3d", sample.keypoints_3d},
+          {"projected_2d", sample.projected_2d},
+          {"record", record}};
+}
+
 ordered_json describe_shard(const fs::path& path) {
   const manifests::Shard shard = manifests::read_shard(path);
   ordered_json samples = ordered_json::array();
@@ -73,22 +94,7 @@ ordered_json describe_sample(const fs::path& path, const std::string& id) {
   for (const ShardFile& file : shard_files(path)) {
     for (const auto& sample : manifests::read_shard(file.path).samples) {
       if (sample.record.id != id) continue;
-      return {{"shard", file.path.string()},
-              {"label", manifests::to_string(sample.label_kind)},
-              {"judgement", describe_judgement(sample.judgement)},
-              {"image_sha256", sample.image_sha256},
-              {"image_size_px", {sample.image_width_px, sample.image_height_px}},
-              {"stored_crop",
-               {{"side_px", sample.crop_side_px},
-                {"bytes", sample.crop.size()},
-                {"from_image", sample.crop_from_image}}},
-              {"camera", sample.camera},
-              {"trans", sample.trans},
-              {"betas", sample.betas},
-              {"pose", sample.pose},
-              {"keypoints_3d", sample.keypoints_3d},
-              {"projected_2d", sample.projected_2d},
-              {"record", ordered_json(manifests::to_json(sample.record))}};
+      return describe_whole(file.path, sample);
     }
   }
   throw std::runtime_error(

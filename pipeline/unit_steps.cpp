@@ -150,7 +150,10 @@ void judge_unit(UnitWork& work, const filters::Thresholds& thresholds) {
   }
   if (!work.refined) return;
   for (const RefinedSample& refined : *work.refined) {
-    work.judgements[refined.sample] = filters::judge_adapted(refined.curve, thresholds);
+    work.judgements[refined.sample] =
+        refined.curve.empty()
+            ? failed(Reason::prediction_not_finite, "nothing could be measured in adaptation")
+            : filters::judge_adapted(refined.curve, thresholds);
   }
 }
 
