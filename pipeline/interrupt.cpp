@@ -38,6 +38,8 @@ void install_interrupt_handlers() {
   struct sigaction last {};
   last.sa_handler = leave_at_once;
   sigaction(SIGALRM, &last, nullptr);
+  // A quota that is reached should fail the write, with a message, and not end the process.
+  std::signal(SIGXFSZ, SIG_IGN);
 }
 
 bool interrupted() {
