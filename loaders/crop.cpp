@@ -11,9 +11,6 @@
 namespace q3d::loaders {
 namespace {
 
-constexpr std::array<double, 3> kImageMean{0.485, 0.456, 0.406};
-constexpr std::array<double, 3> kImageStd{0.229, 0.224, 0.225};
-
 double floored_centre(double start, double extent) {
   return std::floor((start * 2.0 + extent) / 2.0);
 }

@@ -12,6 +12,10 @@ namespace q3d::loaders {
 
 inline constexpr int kPatchSidePx = 256;
 
+// ImageNet's, of colours in [0, 1]: what the network's pictures are normalised with.
+inline constexpr std::array<double, 3> kImageMean{0.485, 0.456, 0.406};
+inline constexpr std::array<double, 3> kImageStd{0.229, 0.224, 0.225};
+
 struct SquareBox {  // pixels of the source image
   double center_x_px = 0.0;
   double center_y_px = 0.0;
@@ -52,9 +56,9 @@ Patch make_patch(const cv::Mat& rgb, const cv::Mat& mask, const SquareBox& box);
 // inside the image for border too.
 cv::Mat border_mask(const cv::Mat& patch_rgb);
 
-// (3, side, side) float32, channel by channel: (min(u8 * colour, 255) - 255 mean) / (255 std) in float32 with
-// ImageNet's mean and std, as the official code computes it under numpy 1.x. Throws std::invalid_argument
-// when `planes` does not hold 3 * side * side numbers.
+// (3, side, side) float32, channel by channel: (min(u8 * colour, 255) - 255 mean) / (255 std) in float32, as
+// the official code computes it under numpy 1.x. Throws std::invalid_argument when `planes` does not hold 3 *
+// side * side numbers.
 void normalise_patch(const cv::Mat& patch_rgb, const std::array<double, 3>& colour_scale,
                      std::span<float> planes);
 

@@ -9,6 +9,7 @@
 
 #include "loaders/augment.h"
 #include "loaders/crop.h"
+#include "loaders/demo_crop.h"
 #include "smal/safetensors.h"
 #include "tests/support/paths.h"
 
@@ -193,6 +194,36 @@ TEST_F(CropParity, augmented_patches_and_labels) {
                 augment_.tensor(name + "_keypoints_3d").slice(1, 0, 3), 2e-7, name + "_keypoints_3d");
     expect_near(tensor_of(rotate_global_orient(sample.global_orient, drawn.rotation_deg)),
                 augment_.tensor(name + "_global_orient"), 1e-6, name + "_global_orient");
+  }
+}
+
+TEST_F(CropParity, demo_crops) {
+  struct Case {
+    std::string name;
+    std::size_t sample;
+    std::array<int, 2> aspect;
+  };
+  std::vector<Case> cases{{"demobig2", 2, {0, 0}}, {"demobig4", 4, {0, 0}}};
+  for (std::size_t i = 0; i < samples_.size(); ++i) {
+    cases.push_back({"demo" + std::to_string(i), i, {0, 0}});
+    cases.push_back({"demo" + std::to_string(i) + "_bboxshape", i, {192, 256}});
+  }
+  for (const auto& [name, sample, aspect] : cases) {
+    const torch::Tensor box = crops_.tensor(name + "_boxes").to(torch::kFloat32).view(-1);
+    const float* corner = box.data_ptr<float>();
+    const DemoCrop crop =
+        demo_crop(samples_[sample].rgb, {corner[0], corner[1], corner[2], corner[3]}, aspect);
+    expect_equal(torch::tensor({crop.center_x_px, crop.center_y_px}), crops_.tensor(name + "_box_center"),
+                 name);
+    expect_near(torch::tensor({crop.side_px}), crops_.tensor(name + "_box_size"), 1e-4, name);
+    const torch::Tensor planes = torch::tensor(crop.planes).view({3, kPatchSidePx, kPatchSidePx});
+    const std::int64_t step = crops_.contains(name + "_img_every4") ? 4 : 16;
+    const std::string picture = name + "_img_every" + std::to_string(step);
+    // Blurred pictures are double sums in another order than scipy's, then float32.
+    const double tolerance = crop.side_px / 512.0 > 1.1 ? 1e-6 : 0.0;
+    expect_near(every(planes, step), crops_.tensor(picture), tolerance, picture);
+    expect_near(planes.to(torch::kFloat64).sum({1, 2}), crops_.tensor(name + "_img_sum"), 1e-3,
+                name + "_img_sum");
   }
 }
 
