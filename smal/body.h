@@ -19,6 +19,7 @@ struct BodyOutput {
 // smal_wrapper.SMAL.forward). Immutable after construction; forward is thread-safe.
 class SmalBody {
  public:
+  // Throws std::runtime_error when check_asset refuses the asset.
   explicit SmalBody(SmalAsset asset, torch::Device device = torch::kCPU);
 
   // rotations (B, 35, 3, 3), betas (B, 41), transl (B, 3) or undefined; float32 (or float64 after to_dtype).
@@ -37,12 +38,9 @@ class SmalBody {
   SmalBody to_dtype(torch::ScalarType dtype) const;
 
  private:
-  struct VertexSet;  // template, blend shapes and skinning of some of the vertices
+  struct Rig;  // what the asset's tensors look like to the arithmetic
   SmalAsset asset_;
-  std::shared_ptr<const VertexSet> all_;
-  std::shared_ptr<const VertexSet> keypoint_vertices_;
-  torch::Tensor joint_template_;   // (35, 3)
-  torch::Tensor joint_shapedirs_;  // (35, 3, 41)
+  std::shared_ptr<const Rig> rig_;
 };
 
 }  // namespace q3d::smal

@@ -1,0 +1,15 @@
+// The body that the golden numbers were made with.
+#pragma once
+
+#include <filesystem>
+
+#include "smal/asset.h"
+
+namespace q3d::testing {
+
+// Builds the asset of `folder`/smal_asset.safetensors: int8 blend shapes times the scales that
+// smal_asset.json states, a sparse joint regressor, and padded skinning rows. Throws std::runtime_error when
+// a file or an entry is missing.
+smal::SmalAsset load_parity_asset(const std::filesystem::path& folder);
+
+}  // namespace q3d::testing
