@@ -19,12 +19,13 @@ void require(bool holds, const std::string& where, const std::string& what) {
   if (!holds) throw ConfigError(where + ": " + what);
 }
 
-void require_one_of(const std::string& value, const std::vector<std::string>& known, const std::string& where) {
+void require_one_of(const std::string& value, const std::vector<std::string>& known,
+                    const std::string& where) {
   if (std::find(known.begin(), known.end(), value) != known.end()) return;
   std::string list;
   for (const auto& word : known) list += (list.empty() ? "" : ", ") + word;
-  throw ConfigError(fmt::format("{}: \"{}\" is not known; expected one of: {}. Did you mean \"{}\"?", where, value,
-                                list, nearest_word(value, known)));
+  throw ConfigError(fmt::format("{}: \"{}\" is not known; expected one of: {}. Did you mean \"{}\"?", where,
+                                value, list, nearest_word(value, known)));
 }
 
 loaders::DatasetOptions parse_dataset(const json& object, const std::string& where) {
@@ -92,8 +93,9 @@ void parse_filter(const json& object, const std::string& where, FilterConfig& fi
   fields.read("tau_high", filter.tau_high);
   fields.read("delta", filter.delta);
   fields.finish();
-  require(filter.tau_low.has_value() == filter.tau_high.has_value(), where,
-          "\"tau_low\" and \"tau_high\" belong together: give both, or neither and run `quadruped3d calibrate`");
+  require(
+      filter.tau_low.has_value() == filter.tau_high.has_value(), where,
+      "\"tau_low\" and \"tau_high\" belong together: give both, or neither and run `quadruped3d calibrate`");
 }
 
 void parse_shards(const json& object, const std::string& where, ShardConfig& shards) {
@@ -121,7 +123,8 @@ void parse_calibrate(const json& object, const std::string& where, filters::Targ
           "the shares must be greater than 0 and their sum less than 1");
 }
 
-// Turns the paths of one file into absolute ones, so that files in different folders can be laid over each other.
+// Turns the paths of one file into absolute ones, so that files in different folders can be laid over each
+// other.
 void resolve_paths(json& config, const fs::path& folder) {
   const auto resolve = [&](json& object, const char* key) {
     if (object.is_object() && object.contains(key) && object[key].is_string()) {
@@ -207,8 +210,10 @@ BuildConfig load_build_config(const std::vector<fs::path>& files) {
 filters::Thresholds thresholds(const BuildConfig& config) {
   if (!config.filter.tau_low || !config.filter.tau_high) {
     throw ConfigError(
-        "the config has no \"filter\": {\"tau_low\", \"tau_high\"}: the thresholds depend on the pool and the "
-        "network, so there is no default. Run `quadruped3d calibrate` with the same config; it prints them and "
+        "the config has no \"filter\": {\"tau_low\", \"tau_high\"}: the thresholds depend on the pool and "
+        "the "
+        "network, so there is no default. Run `quadruped3d calibrate` with the same config; it prints them "
+        "and "
         "writes a file that `build --config` takes as a second layer");
   }
   filters::Thresholds result;

@@ -1,4 +1,5 @@
-// The configuration of a build: one JSON file, or several laid over each other. docs/config.md explains every key.
+// The configuration of a build: one JSON file, or several laid over each other. docs/config.md explains every
+// key.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -35,16 +36,16 @@ struct TtaConfig {
 };
 
 struct FilterConfig {
-  std::optional<double> tau_low;   // crop units; absent until calibrated
+  std::optional<double> tau_low;  // crop units; absent until calibrated
   std::optional<double> tau_high;
   double delta = 0.05;
 };
 
 struct ShardConfig {
-  int unit_size = 512;                 // candidates of one work unit = one shard
-  std::string images = "jpeg";         // jpeg, png or reference (no pictures in the shards)
+  int unit_size = 512;          // candidates of one work unit = one shard
+  std::string images = "jpeg";  // jpeg, png or reference (no pictures in the shards)
   int jpeg_quality = 95;
-  double crop_scale = 1.9;             // the stored crop's side over the box's longer side
+  double crop_scale = 1.9;  // the stored crop's side over the box's longer side
   int crop_min_side_px = 480;
 };
 
@@ -60,8 +61,8 @@ struct BuildConfig {
   nlohmann::json as_written;  // the merged JSON, paths as the user wrote them
 };
 
-// Reads the files in order; a later file's keys replace an earlier one's. Relative paths are relative to the file
-// that names them. Throws ConfigError naming file, key, got and expected.
+// Reads the files in order; a later file's keys replace an earlier one's. Relative paths are relative to the
+// file that names them. Throws ConfigError naming file, key, got and expected.
 BuildConfig load_build_config(const std::vector<std::filesystem::path>& files);
 
 // Checks and converts merged JSON; `where` names it in messages.

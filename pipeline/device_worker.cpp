@@ -1,8 +1,10 @@
 #include "pipeline/device_worker.h"
 
+#include <future>
+
 namespace q3d::pipeline {
 
-DeviceWorker::DeviceWorker() : thread_([this] { run(); }) {}
+DeviceWorker::DeviceWorker() : thread_([this] { work(); }) {}
 
 DeviceWorker::~DeviceWorker() {
   {
@@ -21,7 +23,14 @@ void DeviceWorker::post(std::function<void()> job) {
   arrived_.notify_one();
 }
 
-void DeviceWorker::run() {
+void DeviceWorker::run(const std::function<void()>& job) {
+  std::packaged_task<void()> task(job);
+  std::future<void> done = task.get_future();
+  post([&] { task(); });
+  done.get();
+}
+
+void DeviceWorker::work() {
   for (;;) {
     std::function<void()> job;
     {

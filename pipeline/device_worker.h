@@ -9,8 +9,8 @@
 
 namespace q3d::pipeline {
 
-// Runs jobs in the order they were posted, all on the same thread: LibTorch's CPU operators keep a pool of threads
-// for each calling thread, and a task scheduler's workers would each grow their own.
+// Runs jobs in the order they were posted, all on the same thread: LibTorch's CPU operators keep a pool of
+// threads for each calling thread, and a task scheduler's workers would each grow their own.
 class DeviceWorker {
  public:
   DeviceWorker();
@@ -18,10 +18,11 @@ class DeviceWorker {
   DeviceWorker(const DeviceWorker&) = delete;
   DeviceWorker& operator=(const DeviceWorker&) = delete;
 
-  void post(std::function<void()> job);  // jobs must not throw
+  void post(std::function<void()> job);        // must not throw
+  void run(const std::function<void()>& job);  // waits for it and rethrows what it throws
 
  private:
-  void run();
+  void work();
 
   std::mutex mutex_;
   std::condition_variable arrived_;

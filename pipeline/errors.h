@@ -5,7 +5,8 @@
 
 namespace q3d::pipeline {
 
-// Wrong usage or configuration: exit code 2. Everything else that throws is a failure at run time: exit code 1.
+// Wrong usage or configuration: exit code 2. Everything else that throws is a failure at run time: exit
+// code 1.
 class ConfigError : public std::invalid_argument {
  public:
   using std::invalid_argument::invalid_argument;

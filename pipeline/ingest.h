@@ -21,16 +21,16 @@ struct Candidate {
 // A fixed run of candidates in ingest order: the grain of resume and of determinism. It becomes one shard.
 struct Unit {
   std::int64_t index = 0;
-  std::size_t first = 0;      // into Ingest::candidates
+  std::size_t first = 0;  // into Ingest::candidates
   std::size_t count = 0;
-  std::string input_digest;   // over the records and pictures of the unit
+  std::string input_digest;  // over the records and pictures of the unit
 };
 
 struct Ingest {
-  std::vector<Candidate> candidates;                     // dataset order of the config, then file order
+  std::vector<Candidate> candidates;  // dataset order of the config, then file order
   std::vector<Unit> units;
-  std::map<std::string, std::string> annotation_digests; // "name/split" -> SHA-256 of its annotation file
-  std::vector<std::string> notes;                        // what the loaders want a person to know
+  std::map<std::string, std::string> annotation_digests;  // "name/split" -> SHA-256 of its annotation file
+  std::vector<std::string> notes;                         // what the loaders want a person to know
 };
 
 // Loads every dataset and digests every picture (in parallel; unchanged files come from the cache). Throws

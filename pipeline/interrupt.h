@@ -3,9 +3,9 @@
 
 namespace q3d::pipeline {
 
-// Installs the handlers and a watchdog: the first signal sets the flag; if the program has not ended by itself
-// eight seconds later, or at a second signal, the process exits with 130 at once. That is safe at any moment,
-// because nothing on disk counts before its journal line.
+// Installs the handlers and a watchdog: the first signal sets the flag; if the program has not ended by
+// itself eight seconds later, or at a second signal, the process exits with 130 at once. That is safe at any
+// moment, because nothing on disk counts before its journal line.
 void install_interrupt_handlers();
 
 bool interrupted();

@@ -12,8 +12,9 @@
 
 namespace q3d::pipeline {
 
-// Reads the fields of `object`; `where` names it in messages ("config.json: filter"). Fields that are absent keep
-// the caller's default. finish() throws ConfigError for a key that no read() asked for, naming the nearest one.
+// Reads the fields of `object`; `where` names it in messages ("config.json: filter"). Fields that are absent
+// keep the caller's default. finish() throws ConfigError for a key that no read() asked for, naming the
+// nearest one.
 class JsonFields {
  public:
   JsonFields(const nlohmann::json& object, std::string where);

@@ -12,6 +12,7 @@
 #include "model/device.h"
 #include "model/prima.h"
 #include "model/tta.h"
+#include "smal/synthetic_quadruped.h"
 
 namespace q3d::pipeline {
 namespace {
@@ -56,7 +57,8 @@ torch::Tensor stack_patches(std::span<const PatchView> patches) {
       torch::empty({static_cast<std::int64_t>(patches.size()), kSide, kSide, 3}, torch::kUInt8);
   std::uint8_t* out = batch.data_ptr<std::uint8_t>();
   for (const PatchView& patch : patches) {
-    TORCH_CHECK(patch.size() == static_cast<std::size_t>(kSide * kSide * 3), "patch has ", patch.size(), " bytes");
+    TORCH_CHECK(patch.size() == static_cast<std::size_t>(kSide * kSide * 3), "patch has ", patch.size(),
+                " bytes");
     out = std::copy(patch.begin(), patch.end(), out);
   }
   return batch.permute({0, 3, 1, 2}).contiguous();
@@ -104,8 +106,7 @@ struct Network::Impl {
         options(tta_options(tta)),
         device(choose_device(network.device)),
         prima(model::Prima::load(network.checkpoint, network.smal_asset, device.device,
-                                 network.dtype == "bfloat16" ? torch::kBFloat16 : torch::kFloat32)),
-        key(device.device.is_cpu() ? fmt::format("cpu-{}", threads) : "cuda") {}
+                                 network.dtype == "bfloat16" ? torch::kBFloat16 : torch::kFloat32)) {}
 
   // OpenMP's thread count belongs to the calling thread, so it is set wherever work begins.
   void begin() const { model::configure_compute(threads); }
@@ -116,16 +117,23 @@ struct Network::Impl {
   model::TtaOptions options;
   model::DeviceChoice device;
   model::Prima prima;
-  std::string key;
 };
 
 Network::Network(const NetworkConfig& network, const TtaConfig& tta)
     : impl_(std::make_unique<Impl>(network, tta)) {}
 Network::~Network() = default;
 
-const std::string& Network::device_description() const { return impl_->device.description; }
-const std::string& Network::device_warning() const { return impl_->device.warning; }
-const std::string& Network::device_key() const { return impl_->key; }
+const std::string& Network::device_description() const {
+  return impl_->device.description;
+}
+const std::string& Network::device_warning() const {
+  return impl_->device.warning;
+}
+
+std::string device_key(const NetworkConfig& network) {
+  const bool on_cpu = choose_device(network.device).device.is_cpu();
+  return on_cpu ? fmt::format("cpu-{}", resolved_threads(network.compute_threads)) : "cuda";
+}
 
 std::vector<BodyPrediction> Network::predict(std::span<const PatchView> patches) {
   impl_->begin();
@@ -171,7 +179,8 @@ std::vector<AdaptOutcome> Network::adapt(std::span<const AdaptRequest> requests)
   return outcomes;
 }
 
-void write_initial_checkpoint(const std::filesystem::path& path, const std::string& size, std::uint64_t seed) {
+void write_initial_checkpoint(const std::filesystem::path& path, const std::string& size,
+                              std::uint64_t seed) {
   model::PrimaConfig config;
   try {
     config = model::named_config(size);
@@ -179,6 +188,10 @@ void write_initial_checkpoint(const std::filesystem::path& path, const std::stri
     throw ConfigError(error.what());
   }
   model::write_initial_checkpoint(path, config, seed);
+}
+
+void write_synthetic_asset(const std::filesystem::path& path) {
+  smal::save_asset(path, smal::make_synthetic_quadruped());
 }
 
 }  // namespace q3d::pipeline

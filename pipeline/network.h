@@ -1,5 +1,5 @@
-// The network as the pipeline sees it: plain pictures and keypoints in, plain numbers out. Keeps LibTorch out of
-// every other file of this folder.
+// The network as the pipeline sees it: plain pictures and keypoints in, plain numbers out. Keeps LibTorch out
+// of every other file of this folder.
 #pragma once
 
 #include <array>
@@ -29,7 +29,7 @@ struct BodyPrediction {
 bool is_finite(const BodyPrediction& body);
 
 using CropKeypoints = std::array<float, manifests::kNumKeypoints * 3>;  // x, y in crop units and a weight
-using PatchView = std::span<const std::uint8_t>;                       // 256 x 256 x 3 RGB, row-major
+using PatchView = std::span<const std::uint8_t>;                        // 256 x 256 x 3 RGB, row-major
 
 struct AdaptRequest {
   PatchView patch;
@@ -46,8 +46,8 @@ struct AdaptOutcome {
   int best_iteration = 0;
 };
 
-// Loads checkpoint and SMAL asset; one caller at a time. Batches are formed from consecutive elements of the span,
-// so a result depends on nothing but the span.
+// Loads checkpoint and SMAL asset; one caller at a time. Batches are formed from consecutive elements of the
+// span, so a result depends on nothing but the span.
 class Network {
  public:
   // Throws std::runtime_error (weights, asset, device) or ConfigError (device or dtype name).
@@ -63,15 +63,20 @@ class Network {
   const std::string& device_description() const;
   // A GPU that is present but cannot be used, and why; else empty.
   const std::string& device_warning() const;
-  // What of the device decides the bits: "cpu-2", "cuda": part of the stage keys.
-  const std::string& device_key() const;
 
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
 
+// What of device and threads decides the bits: "cpu-2", "cuda". Part of the stage keys; loads nothing.
+// Throws as Network's constructor does.
+std::string device_key(const NetworkConfig& network);
+
 // A seeded checkpoint of a named size ("vith", "small", "tiny"). Throws ConfigError for another name.
 void write_initial_checkpoint(const std::filesystem::path& path, const std::string& size, std::uint64_t seed);
+
+// The synthetic quadruped (smal/synthetic_quadruped.h) as an asset file.
+void write_synthetic_asset(const std::filesystem::path& path);
 
 }  // namespace q3d::pipeline

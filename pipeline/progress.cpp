@@ -45,7 +45,8 @@ void Progress::draw(bool last) {
   drawn_ = Clock::now();
   const double elapsed = std::chrono::duration<double>(drawn_ - start_).count();
   const double rate = elapsed > 0 ? static_cast<double>(done_ - done_before_) / elapsed : 0.0;
-  std::string line = fmt::format("{}: {} / {} ({} %)", what_, done_, total_, total_ > 0 ? 100 * done_ / total_ : 100);
+  std::string line =
+      fmt::format("{}: {} / {} ({} %)", what_, done_, total_, total_ > 0 ? 100 * done_ / total_ : 100);
   if (rate > 0) line += fmt::format(", {:.1f}/s", rate);
   if (last) {
     line += ", " + human_duration(elapsed);

@@ -11,8 +11,8 @@ namespace q3d::pipeline {
 // "41 s", "12 min 05 s", "3 h 20 min".
 std::string human_duration(double seconds);
 
-// Shows done / total, rate and time left on stderr. Thread-safe. Work that an earlier run had finished is counted
-// as done but not in the rate.
+// Shows done / total, rate and time left on stderr. Thread-safe. Work that an earlier run had finished is
+// counted as done but not in the rate.
 class Progress {
  public:
   Progress(std::string what, std::int64_t total, bool quiet = false);

@@ -7,27 +7,34 @@
 namespace q3d::pipeline {
 namespace {
 
-std::filesystem::path opened(const std::filesystem::path& out, const std::string& stage, const std::string& key) {
+std::filesystem::path opened(const std::filesystem::path& out, const std::string& stage,
+                             const std::string& key) {
   std::filesystem::path folder = stage_folder(out, stage, key);
   open_stage_folder(folder, stage, key);
   return folder;
 }
 
-std::string file_name(const Unit& unit) { return fmt::format("unit-{:06}.h5", unit.index); }
+std::string file_name(const Unit& unit) {
+  return fmt::format("unit-{:06}.h5", unit.index);
+}
 
 }  // namespace
 
 StageStore::StageStore(const std::filesystem::path& out, const std::string& stage, const std::string& key)
     : folder_(opened(out, stage, key)), journal_(folder_ / "journal.jsonl") {}
 
-std::filesystem::path StageStore::file(const Unit& unit) const { return folder_ / file_name(unit); }
+std::filesystem::path StageStore::file(const Unit& unit) const {
+  return folder_ / file_name(unit);
+}
 
 std::optional<manifests::JournalEntry> StageStore::entry(const Unit& unit) const {
   const std::lock_guard lock(mutex_);
   return journal_.find(unit.index, unit.input_digest);
 }
 
-bool StageStore::has(const Unit& unit) const { return entry(unit).has_value(); }
+bool StageStore::has(const Unit& unit) const {
+  return entry(unit).has_value();
+}
 
 std::optional<manifests::Table> StageStore::load(const Unit& unit) const {
   if (!has(unit)) return std::nullopt;
@@ -35,7 +42,8 @@ std::optional<manifests::Table> StageStore::load(const Unit& unit) const {
 }
 
 void StageStore::save(const Unit& unit, const manifests::Table& table) {
-  save(unit, table.rows, [&](const std::filesystem::path& path) { return manifests::write_table(path, table); });
+  save(unit, table.rows,
+       [&](const std::filesystem::path& path) { return manifests::write_table(path, table); });
 }
 
 void StageStore::save(const Unit& unit, std::int64_t rows,

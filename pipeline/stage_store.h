@@ -20,7 +20,8 @@ class StageStore {
   StageStore(const std::filesystem::path& out, const std::string& stage, const std::string& key);
 
   bool has(const Unit& unit) const;
-  std::optional<manifests::Table> load(const Unit& unit) const;  // throws std::runtime_error on a damaged file
+  std::optional<manifests::Table> load(
+      const Unit& unit) const;  // throws std::runtime_error on a damaged file
   void save(const Unit& unit, const manifests::Table& table);
   // Records a file that `write` makes under the given path and whose SHA-256 it returns.
   void save(const Unit& unit, std::int64_t rows,

@@ -31,9 +31,8 @@ std::string ingest_key(const BuildConfig& config, const Ingest& ingest) {
   json datasets = json::array();
   for (const auto& dataset : config.datasets) {
     const std::string name = dataset.name + "/" + dataset.split;
-    datasets.push_back({{"name", name},
-                        {"format", dataset.format},
-                        {"annotations", ingest.annotation_digests.at(name)}});
+    datasets.push_back(
+        {{"name", name}, {"format", dataset.format}, {"annotations", ingest.annotation_digests.at(name)}});
   }
   json units = json::array();
   for (const Unit& unit : ingest.units) units.push_back(unit.input_digest);
@@ -46,7 +45,8 @@ AssetDigests digest_assets(const NetworkConfig& network, manifests::DigestCache&
   return {digests.digest(network.checkpoint), digests.digest(network.smal_asset)};
 }
 
-std::string predict_key(const BuildConfig& config, const AssetDigests& assets, const std::string& device_key) {
+std::string predict_key(const BuildConfig& config, const AssetDigests& assets,
+                        const std::string& device_key) {
   return key_of("predict", kPredictCode,
                 {{"checkpoint", assets.checkpoint},
                  {"smal_asset", assets.smal_asset},
@@ -84,8 +84,8 @@ StageKeys stage_keys(const BuildConfig& config, const filters::Thresholds& thres
                         {"jpeg_quality", config.shards.jpeg_quality},
                         {"crop_scale", config.shards.crop_scale},
                         {"crop_min_side_px", config.shards.crop_min_side_px}});
-  keys.dataset = key_of("dataset", 1,
-                        {{"ingest", keys.ingest}, {"shards", keys.shards}, {"version", config.version}});
+  keys.dataset =
+      key_of("dataset", 1, {{"ingest", keys.ingest}, {"shards", keys.shards}, {"version", config.version}});
   return keys;
 }
 
@@ -94,16 +94,18 @@ std::filesystem::path stage_folder(const std::filesystem::path& out, const std::
   return out / "stages" / (stage + "-" + key.substr(0, kShortKey));
 }
 
-void open_stage_folder(const std::filesystem::path& folder, const std::string& stage, const std::string& key) {
+void open_stage_folder(const std::filesystem::path& folder, const std::string& stage,
+                       const std::string& key) {
   std::filesystem::create_directories(folder);
   manifests::remove_temporaries(folder);
   const std::filesystem::path manifest = folder / "manifest.json";
   if (std::filesystem::exists(manifest)) {
     const json found = json::parse(manifests::read_file(manifest), nullptr, false);
     if (found.is_object() && found.value("key", "") == key) return;
-    throw std::runtime_error(fmt::format("{}: expected the {} stage with key {}, found {}; remove the folder to "
-                                         "make it anew",
-                                         manifest.string(), stage, key, found.is_object() ? found.dump() : "no JSON"));
+    throw std::runtime_error(
+        fmt::format("{}: expected the {} stage with key {}, found {}; remove the folder to "
+                    "make it anew",
+                    manifest.string(), stage, key, found.is_object() ? found.dump() : "no JSON"));
   }
   manifests::write_file_atomically(manifest, json{{"stage", stage}, {"key", key}}.dump(2) + "\n");
 }

@@ -1,9 +1,9 @@
 // The stages, their keys and their folders.
 //
-// A stage's key is a hash of its code version, its part of the config, the keys of the stages before it and the
-// digests of the assets it reads. What a stage made lies in <out>/stages/<stage>-<key>/, one file a unit and a
-// journal; a unit's file counts only if the journal holds it with the unit's own input digest. So a changed tau
-// redoes the verdicts and what follows, and added photos make only new units and the last one.
+// A stage's key is a hash of its code version, its part of the config, the keys of the stages before it and
+// the digests of the assets it reads. What a stage made lies in <out>/stages/<stage>-<key>/, one file a unit
+// and a journal; a unit's file counts only if the journal holds it with the unit's own input digest. So a
+// changed tau redoes the verdicts and what follows, and added photos make only new units and the last one.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -29,12 +29,12 @@ AssetDigests digest_assets(const NetworkConfig& network, manifests::DigestCache&
 
 // Keys are 64 hex digits. device_key is Network::device_key(), or what it would be.
 struct StageKeys {
-  std::string ingest;    // annotation files and every unit's input digest
+  std::string ingest;  // annotation files and every unit's input digest
   std::string predict;
   std::string fidelity;
   std::string refine;
   std::string shards;
-  std::string dataset;   // the version: everything above
+  std::string dataset;  // the version: everything above
 };
 
 std::string predict_key(const BuildConfig& config, const AssetDigests& assets, const std::string& device_key);

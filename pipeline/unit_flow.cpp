@@ -6,7 +6,6 @@
 #include <exception>
 #include <mutex>
 
-#include "pipeline/device_worker.h"
 #include "pipeline/interrupt.h"
 
 namespace q3d::pipeline {
@@ -41,11 +40,10 @@ class FirstFailure {
 
 }  // namespace
 
-void run(const UnitFlow& flow) {
+void run(const UnitFlow& flow, DeviceWorker& device) {
   namespace tf = tbb::flow;
   using DeviceNode = tf::async_node<Item, Item>;
   FirstFailure failure;
-  DeviceWorker device;
   tf::graph graph;
 
   std::int64_t next = 0;
@@ -68,9 +66,8 @@ void run(const UnitFlow& flow) {
       gateway.release_wait();
     });
   });
-  tf::sequencer_node<Item> in_order(graph, [](const Item& item) {
-    return static_cast<std::size_t>(item->unit->index);
-  });
+  tf::sequencer_node<Item> in_order(
+      graph, [](const Item& item) { return static_cast<std::size_t>(item->unit->index); });
   tf::function_node<Item, tf::continue_msg> write(graph, tf::serial, [&](const Item& item) {
     failure.guard([&] { flow.write(*item); });
     item->decoded.clear();

@@ -1,12 +1,14 @@
 // The flow graph: reads like the paper's figure of Stage 2.
 //
-//   read -> decode + crop (parallel) -> predict -> judge -> refine -> judge (device thread) -> write (in order)
+//   read -> decode + crop (parallel) -> predict -> judge -> refine -> judge (device thread) -> write (in
+//   order)
 #pragma once
 
 #include <cstdint>
 #include <functional>
 #include <memory>
 
+#include "pipeline/device_worker.h"
 #include "pipeline/unit_work.h"
 
 namespace q3d::pipeline {
@@ -24,8 +26,8 @@ struct UnitFlow {
   std::function<void(UnitWork&)> write;
 };
 
-// Runs every unit through the graph. The first exception of any step stops it and is rethrown; Ctrl-C drops the
-// units in flight and throws Interrupted.
-void run(const UnitFlow& flow);
+// Runs every unit through the graph. The first exception of any step stops it and is rethrown; Ctrl-C drops
+// the units in flight and throws Interrupted.
+void run(const UnitFlow& flow, DeviceWorker& device);
 
 }  // namespace q3d::pipeline

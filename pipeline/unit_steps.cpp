@@ -10,6 +10,7 @@
 #include "loaders/crop.h"
 #include "loaders/encode.h"
 #include "loaders/image.h"
+#include "loaders/stored_crop.h"
 #include "pipeline/interrupt.h"
 
 namespace q3d::pipeline {
@@ -18,12 +19,6 @@ namespace {
 using filters::Band;
 using manifests::Reason;
 using manifests::Verdict;
-
-// What the steps to come need of one candidate's picture.
-struct Wanted {
-  bool patch = false;
-  bool stored_crop = false;
-};
 
 Wanted wanted(const UnitWork& work, std::size_t i, const filters::Thresholds* thresholds) {
   if (work.candidates[i].record.failure != Reason::none) return {};
@@ -43,13 +38,23 @@ void store_crop(DecodedSample& sample, const cv::Mat& rgb, const cv::Mat& mask, 
                 const ShardConfig& shards) {
   const loaders::StoredCrop crop =
       loaders::make_stored_crop(rgb, mask, box, shards.crop_scale, shards.crop_min_side_px);
-  sample.stored_side_px = crop.side_px;
+  sample.stored_side_px = crop.rgb.cols;
   sample.stored_from_image = crop.from_image;
   if (shards.images == "reference") return;
   sample.stored_crop = shards.images == "png" ? loaders::encode_png(crop.rgb)
                                               : loaders::encode_jpeg(crop.rgb, shards.jpeg_quality);
   if (!crop.mask.empty()) sample.stored_mask = loaders::encode_png(crop.mask);
 }
+
+manifests::Judgement failed(Reason reason, const std::string& detail) {
+  manifests::Judgement judgement;
+  judgement.verdict = Verdict::failed;
+  judgement.reason = reason;
+  judgement.detail = detail;
+  return judgement;
+}
+
+}  // namespace
 
 DecodedSample decode_sample(const manifests::SampleRecord& record, Wanted want, const ShardConfig& shards) {
   DecodedSample sample;
@@ -69,8 +74,8 @@ DecodedSample decode_sample(const manifests::SampleRecord& record, Wanted want, 
   if (box.x_px >= image.rgb.cols || box.y_px >= image.rgb.rows || box.x_px + box.w_px <= 0 ||
       box.y_px + box.h_px <= 0) {
     sample.failure = Reason::box_outside_image;
-    sample.detail = fmt::format("box x={} y={} w={} h={} px, picture {} x {} px", box.x_px, box.y_px, box.w_px,
-                                box.h_px, image.rgb.cols, image.rgb.rows);
+    sample.detail = fmt::format("box x={} y={} w={} h={} px, picture {} x {} px", box.x_px, box.y_px,
+                                box.w_px, box.h_px, image.rgb.cols, image.rgb.rows);
     return sample;
   }
   const loaders::SquareBox square = loaders::square_box(box);
@@ -83,16 +88,6 @@ DecodedSample decode_sample(const manifests::SampleRecord& record, Wanted want, 
   return sample;
 }
 
-manifests::Judgement failed(Reason reason, const std::string& detail) {
-  manifests::Judgement judgement;
-  judgement.verdict = Verdict::failed;
-  judgement.reason = reason;
-  judgement.detail = detail;
-  return judgement;
-}
-
-}  // namespace
-
 CropKeypoints crop_keypoints(const manifests::SampleRecord& record) {
   const loaders::SquareBox box = loaders::square_box(record.box);
   return loaders::keypoints_to_crop(record.keypoints, loaders::patch_from_image(box, loaders::kPatchSidePx));
@@ -101,7 +96,8 @@ CropKeypoints crop_keypoints(const manifests::SampleRecord& record) {
 double initial_error(const Candidate& candidate, const PredictedSample& predicted) {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   if (predicted.failure != Reason::none) return kNone;
-  return filters::projection_error(predicted.body.keypoints_2d, crop_keypoints(candidate.record)).value_or(kNone);
+  return filters::projection_error(predicted.body.keypoints_2d, crop_keypoints(candidate.record))
+      .value_or(kNone);
 }
 
 void decode_unit(UnitWork& work, const ShardConfig& shards, const filters::Thresholds* thresholds) {
@@ -109,7 +105,8 @@ void decode_unit(UnitWork& work, const ShardConfig& shards, const filters::Thres
   tbb::parallel_for(std::size_t{0}, work.candidates.size(), [&](std::size_t i) {
     if (interrupted()) return;
     const Wanted want = wanted(work, i, thresholds);
-    if (want.patch || want.stored_crop) work.decoded[i] = decode_sample(work.candidates[i].record, want, shards);
+    if (want.patch || want.stored_crop)
+      work.decoded[i] = decode_sample(work.candidates[i].record, want, shards);
   });
 }
 
@@ -147,13 +144,17 @@ void judge_unit(UnitWork& work, const filters::Thresholds& thresholds) {
   work.judgements.assign(work.candidates.size(), {});
   for (std::size_t i = 0; i < work.candidates.size(); ++i) {
     const PredictedSample& predicted = (*work.predicted)[i];
-    work.judgements[i] = predicted.failure != Reason::none
-                             ? failed(predicted.failure, predicted.detail)
-                             : filters::judge_initial(initial_error(work.candidates[i], predicted), thresholds);
+    work.judgements[i] =
+        predicted.failure != Reason::none
+            ? failed(predicted.failure, predicted.detail)
+            : filters::judge_initial(initial_error(work.candidates[i], predicted), thresholds);
   }
   if (!work.refined) return;
   for (const RefinedSample& refined : *work.refined) {
-    work.judgements[refined.sample] = filters::judge_adapted(refined.curve, thresholds);
+    work.judgements[refined.sample] =
+        refined.curve.empty()
+            ? failed(Reason::prediction_not_finite, "nothing could be measured in adaptation")
+            : filters::judge_adapted(refined.curve, thresholds);
   }
 }
 

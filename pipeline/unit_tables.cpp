@@ -29,8 +29,8 @@ void read_field(const Table& table, const std::string& name, std::vector<Row>& r
                 std::array<float, N> BodyPrediction::*field) {
   const std::span<const float> values = table.column<float>(name);
   if (values.size() != rows.size() * N) {
-    throw std::runtime_error(fmt::format("column {} holds {} numbers, expected {} rows of {}", name, values.size(),
-                                         rows.size(), N));
+    throw std::runtime_error(fmt::format("column {} holds {} numbers, expected {} rows of {}", name,
+                                         values.size(), rows.size(), N));
   }
   for (std::size_t i = 0; i < rows.size(); ++i) {
     std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(i * N), N, (rows[i].body.*field).begin());
@@ -44,8 +44,10 @@ void visit_body(Visitor&& visit) {
   visit("betas", std::vector<std::int64_t>{manifests::kNumBetas}, &BodyPrediction::betas);
   visit("camera", std::vector<std::int64_t>{3}, &BodyPrediction::camera);
   visit("translation", std::vector<std::int64_t>{3}, &BodyPrediction::translation);
-  visit("keypoints_3d", std::vector<std::int64_t>{manifests::kNumKeypoints, 3}, &BodyPrediction::keypoints_3d);
-  visit("keypoints_2d", std::vector<std::int64_t>{manifests::kNumKeypoints, 2}, &BodyPrediction::keypoints_2d);
+  visit("keypoints_3d", std::vector<std::int64_t>{manifests::kNumKeypoints, 3},
+        &BodyPrediction::keypoints_3d);
+  visit("keypoints_2d", std::vector<std::int64_t>{manifests::kNumKeypoints, 2},
+        &BodyPrediction::keypoints_2d);
   visit("aux_keypoints_2d", std::vector<std::int64_t>{manifests::kNumKeypoints, 2},
         &BodyPrediction::aux_keypoints_2d);
 }

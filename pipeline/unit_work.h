@@ -54,8 +54,8 @@ struct UnitWork {
   bool refined_before = false;
   bool shard_before = false;
 
-  std::vector<DecodedSample> decoded;              // by position; freed once the shard is written
-  std::vector<manifests::Judgement> judgements;    // by position
+  std::vector<DecodedSample> decoded;            // by position; freed once the shard is written
+  std::vector<manifests::Judgement> judgements;  // by position
 };
 
 }  // namespace q3d::pipeline
