@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "manifests/record_json.h"
+#include "pipeline/errors.h"
 #include "pipeline/interrupt.h"
 
 namespace q3d::pipeline {
@@ -26,6 +27,14 @@ void require_unique_ids(const std::vector<Candidate>& candidates) {
       throw std::runtime_error(fmt::format("the sample id {} occurs twice; ids must be unique within a build",
                                            candidate.record.id));
     }
+  }
+}
+
+loaders::Dataset load(const loaders::DatasetOptions& options) {
+  try {
+    return loaders::load_dataset(options);
+  } catch (const std::invalid_argument& error) {
+    throw ConfigError(fmt::format("dataset {}: {}", options.name, error.what()));
   }
 }
 
@@ -67,7 +76,7 @@ Ingest ingest(const BuildConfig& config, manifests::DigestCache& digests) {
   Ingest result;
   for (const auto& options : config.datasets) {
     throw_if_interrupted();
-    loaders::Dataset dataset = loaders::load_dataset(options);
+    loaders::Dataset dataset = load(options);
     const std::string name = options.name + "/" + options.split;
     result.annotation_digests[name] = digests.digest(annotation_path(options));
     for (auto& record : dataset.records) result.candidates.push_back({std::move(record), {}});

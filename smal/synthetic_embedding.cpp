@@ -1,5 +1,6 @@
 #include "smal/synthetic_embedding.h"
 
+#include <algorithm>
 #include <cmath>
 #include <deque>
 
@@ -71,16 +72,24 @@ void place_tube(const QuadrupedMesh& mesh, const Tube& tube, const Anatomy& anat
   points.row(mesh.pole_of(tube.part)) = profile.pole;
 }
 
-// Steps over edges from the nearest border of a hole; large values are cut off at `limit`.
-std::vector<int> steps_from_holes(const QuadrupedMesh& mesh, int limit) {
-  std::vector<int> steps(mesh.vertices.size(), limit);
+// How far the seams reach, in edges. Small tubes start part of the way: their own shape is not to be rounded
+// off.
+constexpr int kSeamReach = 4;
+int first_step(Part part) {
+  return part == Part::right_foreleg || part == Part::right_hindleg ? 0 : 2;
+}
+
+// Steps over edges from the nearest border of a hole, at most kSeamReach.
+std::vector<int> steps_from_holes(const QuadrupedMesh& mesh) {
+  std::vector<int> steps(mesh.vertices.size(), kSeamReach);
   std::deque<int> front;
   for (const Tube& tube : kTubes) {
     for (const auto& [ring, side] : hole_border(tube.hole)) {
       const auto& row = mesh.rings_of(Part::body)[static_cast<std::size_t>(ring)];
       const int vertex = row[static_cast<std::size_t>((side + kBodySides) % kBodySides)];
       for (const int v : {vertex, mesh.mirror[static_cast<std::size_t>(vertex)]}) {
-        steps[static_cast<std::size_t>(v)] = 0;
+        steps[static_cast<std::size_t>(v)] =
+            std::min(steps[static_cast<std::size_t>(v)], first_step(tube.part));
         front.push_back(v);
       }
     }
@@ -101,17 +110,16 @@ std::vector<int> steps_from_holes(const QuadrupedMesh& mesh, int limit) {
 
 // Rounds the seams between the body and its tubes by moving vertices towards the mean of their neighbours.
 void smooth_seams(const QuadrupedMesh& mesh, Points& points) {
-  constexpr int kReach = 4;
   constexpr int kPasses = 14;
-  const std::vector<int> steps = steps_from_holes(mesh, kReach);
+  const std::vector<int> steps = steps_from_holes(mesh);
   for (int pass = 0; pass < kPasses; ++pass) {
     Points next = points;
     for (std::size_t v = 0; v < steps.size(); ++v) {
-      if (steps[v] >= kReach) continue;
+      if (steps[v] >= kSeamReach) continue;
       Eigen::RowVector3d mean = Eigen::RowVector3d::Zero();
       for (const int neighbour : mesh.neighbours[v]) mean += points.row(neighbour);
       mean /= static_cast<double>(mesh.neighbours[v].size());
-      const double pull = 0.5 * (1.0 - static_cast<double>(steps[v]) / kReach);
+      const double pull = 0.5 * (1.0 - static_cast<double>(steps[v]) / kSeamReach);
       const auto row = static_cast<Eigen::Index>(v);
       next.row(row) += pull * (mean - points.row(row));
     }

@@ -2,33 +2,15 @@
 
 #include "smal/synthetic_shapes.h"
 #include "smal/synthetic_skeleton.h"
+#include "smal/synthetic_tensor.h"
 
 namespace q3d::smal {
-namespace {
-
-using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
-torch::Tensor to_tensor(const RowMajor& matrix, const std::vector<std::int64_t>& shape) {
-  return torch::from_blob(const_cast<double*>(matrix.data()), shape, torch::kFloat64).to(torch::kFloat32);
-}
-
-const QuadrupedMesh& mesh() {
-  static const QuadrupedMesh made = make_quadruped_mesh();
-  return made;
-}
-
-// Half a thousand animals are embedded for it: made once.
-const ShapeSpace& shape_space() {
-  static const ShapeSpace made = make_shape_space(mesh());
-  return made;
-}
-
-}  // namespace
 
 SmalAsset make_synthetic_quadruped() {
-  const ShapeSpace& space = shape_space();
-  const Eigen::MatrixXd weights = skinning_weights(mesh());
-  const Eigen::MatrixXd regressor = joint_regressor(mesh());
+  const QuadrupedMesh& mesh = synthetic_mesh();
+  const ShapeSpace& space = synthetic_shape_space();
+  const Eigen::MatrixXd weights = skinning_weights(mesh);
+  const Eigen::MatrixXd regressor = joint_regressor(mesh);
   const Eigen::MatrixXd joints = regressor * space.mean;
 
   SmalAsset asset;
@@ -45,24 +27,25 @@ SmalAsset make_synthetic_quadruped() {
   auto face = asset.faces.accessor<std::int32_t, 2>();
   for (std::int64_t f = 0; f < kNumFaces; ++f) {
     for (std::int64_t corner = 0; corner < 3; ++corner) {
-      face[f][corner] = mesh().faces[static_cast<std::size_t>(f)][static_cast<std::size_t>(corner)];
+      face[f][corner] = mesh.faces[static_cast<std::size_t>(f)][static_cast<std::size_t>(corner)];
     }
   }
   asset.parents = torch::empty({kNumJoints}, torch::kInt32);
   for (std::int64_t joint = 0; joint < kNumJoints; ++joint) {
     asset.parents[joint] = synthetic_joints()[static_cast<std::size_t>(joint)].parent;
   }
-  asset.keypoint_vertices = keypoint_groups(mesh());
+  asset.keypoint_vertices = keypoint_groups(mesh);
   return asset;
 }
 
 torch::Tensor synthetic_family_means() {
-  return to_tensor(shape_space().family_means, {static_cast<std::int64_t>(kNumFamilies), kNumBetas});
+  return to_tensor(synthetic_shape_space().family_means,
+                   {static_cast<std::int64_t>(kNumFamilies), kNumBetas});
 }
 
 torch::Tensor synthetic_betas_std() {
   Eigen::VectorXd variance = Eigen::VectorXd::Zero(kNumBetas);
-  for (const Eigen::MatrixXd& covariance : shape_space().family_covariances)
+  for (const Eigen::MatrixXd& covariance : synthetic_shape_space().family_covariances)
     variance += covariance.diagonal();
   return to_tensor((variance / static_cast<double>(kNumFamilies)).cwiseSqrt(), {kNumBetas});
 }

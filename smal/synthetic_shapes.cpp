@@ -60,10 +60,21 @@ ShapeSpace make_shape_space(const QuadrupedMesh& mesh) {
   coordinates *= std::sqrt(static_cast<double>(kFamilies));
   space.family_means = coordinates.topRows(kFamilies);
   for (Eigen::Index f = 0; f < kFamilies; ++f) {
-    const Eigen::MatrixXd within = coordinates.middleRows(kFamilies + f * kMeasures, kMeasures);
-    space.family_covariances[static_cast<std::size_t>(f)] = within.transpose() * within;
+    const auto at = static_cast<std::size_t>(f);
+    space.family_factors[at] = coordinates.middleRows(kFamilies + f * kMeasures, kMeasures);
+    space.family_covariances[at] = space.family_factors[at].transpose() * space.family_factors[at];
   }
   return space;
+}
+
+const QuadrupedMesh& synthetic_mesh() {
+  static const QuadrupedMesh kMesh = make_quadruped_mesh();
+  return kMesh;
+}
+
+const ShapeSpace& synthetic_shape_space() {
+  static const ShapeSpace kSpace = make_shape_space(synthetic_mesh());
+  return kSpace;
 }
 
 Eigen::MatrixXd pose_blend_shapes(const Points& rest, const Eigen::MatrixXd& joints,

@@ -13,13 +13,19 @@ namespace q3d::smal {
 // The principal components of five families of animals whose measures vary independently. Each beta has mean
 // 0 and variance 1 over all families together.
 struct ShapeSpace {
-  Points mean;                                                   // (V, 3)
-  Eigen::MatrixXd directions;                                    // (3 V, 41), by decreasing size
-  Eigen::MatrixXd family_means;                                  // (5, 41)
-  std::array<Eigen::MatrixXd, kNumFamilies> family_covariances;  // (41, 41)
+  Points mean;                   // (V, 3)
+  Eigen::MatrixXd directions;    // (3 V, 41), by decreasing size
+  Eigen::MatrixXd family_means;  // (5, 41)
+  std::array<Eigen::MatrixXd, kNumFamilies>
+      family_factors;  // (measures, 41): betas of one deviation of each measure
+  std::array<Eigen::MatrixXd, kNumFamilies> family_covariances;  // (41, 41): factor' factor
 };
 
 ShapeSpace make_shape_space(const QuadrupedMesh& mesh);
+
+// The mesh, and the shape space made from it: made on the first call (half a thousand animals), then shared.
+const QuadrupedMesh& synthetic_mesh();
+const ShapeSpace& synthetic_shape_space();
 
 // (306, 3 V): row 9 (joint - 1) + 3 r + c multiplies entry (r, c) of the joint's rotation minus the identity.
 // Linear blend skinning by weights w and 1 - w pulls a vertex at r from the joint towards it by

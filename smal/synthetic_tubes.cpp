@@ -42,69 +42,93 @@ TubeProfile rings_along(const std::vector<Knot>& knots, int rings, const Vector3
   return profile;
 }
 
-// The last rings of a foot: heel, ball and toes, flat on the ground.
-void add_foot(const Anatomy& a, double first_ring, const Vector3d& fetlock, double cannon,
-              std::vector<Knot>& knots, Vector3d& toe) {
-  const double ground = ground_height(a);
-  const double half_height = a.foot_height / 2;
-  const Vector3d heel(fetlock.x() + 0.10 * a.foot_length, ground + 1.0 * half_height, fetlock.z());
-  toe = Vector3d(fetlock.x() + 0.80 * a.foot_length, ground + 0.55 * half_height, fetlock.z());
-  knots.push_back({first_ring, fetlock, 0.55 * cannon, 0.55 * cannon});
+// A knot of a leg: the ring's plane is tilted from level (0, the leg points down) to upright (pi / 2, it
+// points forwards) rather than square to the curve, which would fold thick rings into each other at a short
+// foot.
+struct LegKnot {
+  double ring;
+  Vector3d center;
+  double across, along;
+  double tilt;
+};
+
+TubeProfile leg_rings(const std::vector<LegKnot>& knots, int rings, const Vector3d& pole) {
+  std::vector<double> positions;
+  Eigen::MatrixXd values(static_cast<Eigen::Index>(knots.size()), 6);
+  for (const LegKnot& knot : knots) {
+    values.row(static_cast<Eigen::Index>(positions.size())) << knot.center.transpose(), knot.across,
+        knot.along, knot.tilt;
+    positions.push_back(knot.ring);
+  }
+  const SmoothCurve curve(positions, values);
+  TubeProfile profile;
+  for (int ring = 0; ring < rings; ++ring) {
+    const Eigen::VectorXd here = curve.at(ring);
+    const Vector3d along(std::cos(here[5]), std::sin(here[5]), 0.0);
+    profile.rings.push_back({here.head<3>(), here[3] * Vector3d::UnitZ(), here[4] * along});
+  }
+  profile.pole = pole;
+  return profile;
+}
+
+// The last rings of a leg: fetlock, heel, ball and toes, flat on the ground. Returns the pole.
+Vector3d add_foot(const Anatomy& a, double first_ring, const Vector3d& fetlock, double cannon,
+                  std::vector<LegKnot>& knots) {
+  const double floor = ground_height(a);
+  const auto at = [&](double share, double height) {
+    return Vector3d(fetlock.x() + share * a.foot_length, floor + height * a.foot_height, fetlock.z());
+  };
+  const double half = a.foot_height / 2;
+  knots.push_back({first_ring, fetlock, 0.54 * cannon, 0.54 * cannon, 0.15});
   knots.push_back(
-      {first_ring + 2, heel + Vector3d(0.15 * a.foot_length, 0, 0), 0.48 * a.foot_width, 1.15 * half_height});
-  knots.push_back({first_ring + 3, (heel + toe) / 2 + Vector3d(0.05 * a.foot_length, 0, 0),
-                   0.52 * a.foot_width, 1.05 * half_height});
-  knots.push_back({first_ring + 4, toe, 0.36 * a.foot_width, 0.55 * half_height});
-  toe.x() += 0.06 * a.foot_length;
+      {first_ring + 2, at(0.16, 0.56), 0.46 * a.foot_width, 0.28 * a.foot_length + 0.4 * half, 0.60});
+  knots.push_back({first_ring + 3, at(0.46, 0.46), 0.52 * a.foot_width, 1.00 * half, 1.10});
+  knots.push_back({first_ring + 4, at(0.76, 0.32), 0.38 * a.foot_width, 0.60 * half, 1.40});
+  return at(0.86, 0.24);
 }
 
 TubeProfile foreleg(const Tube& tube, const Anatomy& a, const BodyProfile& body, const Vector3d& root) {
-  const double ground = ground_height(a);
+  const double floor = ground_height(a);
   const double z = a.foreleg_distance / 2;
-  const double elbow_y = ground + a.foreleg_length;
-  const double elbow_x = body.rings[30].belly.x() - 0.03 * a.trunk_length;
-  const double carpus_y = ground + 0.40 * a.foreleg_length;
-  const double fetlock_y = ground + a.foot_height + 0.05 * a.foreleg_length;
-  const Vector3d elbow(elbow_x, elbow_y, z), carpus(elbow_x + 0.035, carpus_y, z),
-      fetlock(elbow_x + 0.035, fetlock_y, z);
+  const double x = body.rings[30].belly.x() - 0.03 * a.trunk_length;
   const double thick = a.elbow_thickness / 2;
-  std::vector<Knot> knots = {
-      {0, 0.5 * (root + Vector3d(elbow_x, elbow_y + 0.06, z)), 1.05 * thick, 1.35 * thick},
-      {3, elbow, 0.80 * thick, 1.05 * thick},
-      {6, (elbow + carpus) / 2 + Vector3d(0.005, 0.04 * a.foreleg_length, 0),
-       0.30 * a.elbow_thickness + 0.12 * a.carpus_thickness,
-       0.36 * a.elbow_thickness + 0.12 * a.carpus_thickness},
-      {9, carpus, 0.50 * a.carpus_thickness, 0.50 * a.carpus_thickness},
-      {12, (carpus + fetlock) / 2, 0.50 * a.fore_cannon_thickness, 0.50 * a.fore_cannon_thickness}};
-  Vector3d toe;
-  add_foot(a, 14, fetlock, a.fore_cannon_thickness, knots, toe);
-  return rings_along(knots, tube.rings, Vector3d::UnitZ(), toe);
+  const double carpus_half = a.carpus_thickness / 2, cannon_half = a.fore_cannon_thickness / 2;
+  const Vector3d elbow(x, floor + a.foreleg_length, z);
+  const Vector3d carpus(x + 0.03, floor + 0.40 * a.foreleg_length, z);
+  const Vector3d fetlock(x + 0.03, floor + a.foot_height + 0.06 * a.foreleg_length, z);
+  std::vector<LegKnot> knots = {
+      {0, 0.5 * (root + elbow + Vector3d(0, 0.06, 0)), 1.05 * thick, 1.35 * thick, 0.0},
+      {3, elbow, 0.85 * thick, 1.05 * thick, 0.05},
+      {6, 0.5 * (elbow + carpus) + Vector3d(0, 0.04 * a.foreleg_length, 0), 0.52 * thick + 0.34 * carpus_half,
+       0.62 * thick + 0.30 * carpus_half, 0.08},
+      {9, carpus, carpus_half, carpus_half, 0.0},
+      {12, 0.5 * (carpus + fetlock), cannon_half, cannon_half, 0.0}};
+  const Vector3d toe = add_foot(a, 14, fetlock, a.fore_cannon_thickness, knots);
+  return leg_rings(knots, tube.rings, toe);
 }
 
 TubeProfile hindleg(const Tube& tube, const Anatomy& a, const BodyProfile& body, const Vector3d& root) {
-  const double ground = ground_height(a);
+  const double floor = ground_height(a);
   const double z = a.hindleg_distance / 2;
   const double hip_x = body.rings[5].back.x();
   const double flank_y = body.rings[8].belly.y();
-  const double hock_y = ground + a.hock_height;
-  const double stifle_y = 0.62 * flank_y + 0.38 * hock_y;
+  const double hock_y = floor + a.hock_height;
   const double reach = flank_y - hock_y;
-  const Vector3d stifle(hip_x + 0.06 + 0.10 * reach, stifle_y, z);
-  const Vector3d hock(hip_x - 0.05 - 0.16 * reach, hock_y, z);
-  const Vector3d fetlock(hock.x() + 0.02 + 0.10 * a.hock_height,
-                         ground + a.foot_height + 0.10 * a.hock_height, z);
-  const double thigh = a.thigh_thickness;
-  std::vector<Knot> knots = {
-      {0, 0.75 * root + 0.25 * Vector3d(hip_x + 0.02, stifle_y, z), 0.30 * thigh, 0.58 * thigh},
-      {2, 0.45 * root + 0.55 * stifle + Vector3d(-0.10 * thigh, 0, 0), 0.30 * thigh, 0.50 * thigh},
-      {4, stifle + Vector3d(-0.02, 0, 0), 0.42 * a.stifle_thickness, 0.56 * a.stifle_thickness},
-      {7, (stifle + hock) / 2, 0.20 * a.stifle_thickness + 0.22 * a.hock_thickness,
-       0.22 * a.stifle_thickness + 0.30 * a.hock_thickness},
-      {10, hock, 0.42 * a.hock_thickness, 0.54 * a.hock_thickness},
-      {12, (hock + fetlock) / 2, 0.50 * a.hind_cannon_thickness, 0.50 * a.hind_cannon_thickness}};
-  Vector3d toe;
-  add_foot(a, 14, fetlock, a.hind_cannon_thickness, knots, toe);
-  return rings_along(knots, tube.rings, Vector3d::UnitZ(), toe);
+  const double thigh = a.thigh_thickness / 2, knee = a.stifle_thickness / 2;
+  const double hock_half = a.hock_thickness / 2, cannon_half = a.hind_cannon_thickness / 2;
+  const Vector3d stifle(hip_x + 0.04 + 0.08 * reach, 0.64 * flank_y + 0.36 * hock_y, z);
+  const Vector3d hock(hip_x - 0.03 - 0.12 * reach, hock_y, z);
+  const Vector3d fetlock(hock.x() + 0.01 + 0.10 * a.hock_height, floor + a.foot_height + 0.10 * a.hock_height,
+                         z);
+  std::vector<LegKnot> knots = {
+      {0, 0.8 * root + 0.2 * Vector3d(hip_x + 0.02, stifle.y(), z), 0.66 * thigh, 1.12 * thigh, 0.05},
+      {2, 0.45 * root + 0.55 * stifle - Vector3d(0.16 * thigh, 0, 0), 0.66 * thigh, 0.92 * thigh, 0.05},
+      {4, stifle - Vector3d(0.25 * knee, 0, 0), 0.85 * knee, 1.02 * knee, -0.12},
+      {7, 0.5 * (stifle + hock), 0.40 * knee + 0.46 * hock_half, 0.46 * knee + 0.54 * hock_half, -0.38},
+      {10, hock, 0.88 * hock_half, 1.10 * hock_half, -0.20},
+      {12, 0.5 * (hock + fetlock), cannon_half, cannon_half, 0.05}};
+  const Vector3d toe = add_foot(a, 14, fetlock, a.hind_cannon_thickness, knots);
+  return leg_rings(knots, tube.rings, toe);
 }
 
 TubeProfile tail(const Tube& tube, const Anatomy& a, const Vector3d& root) {

@@ -126,7 +126,10 @@ std::vector<PicturePlan> plan_split(SetId set, bool test, double share, std::uin
   const int first_id = test ? scaled(domain.train, share) + 1 : 1;
   std::vector<PicturePlan> plans;
   for (int index = 0; index < total; ++index) {
-    PicturePlan plan{.set = set, .test = test, .index = index};
+    PicturePlan plan;
+    plan.set = set;
+    plan.test = test;
+    plan.index = index;
     plan.individual = index / group;
     plan.species = shown[static_cast<std::size_t>(plan.individual)];
     plan.image_id = first_id + index;
