@@ -6,6 +6,8 @@
 #include <embree3/rtcore.h>
 #endif
 
+#include <oneapi/tbb/task_arena.h>
+
 #include <algorithm>
 #include <cstring>
 #include <limits>
@@ -68,15 +70,17 @@ struct RayDevice::Handle {
 };
 
 RayDevice::RayDevice() : handle_(std::make_unique<Handle>()) {
-  // One thread: pictures are rendered in parallel, and a hierarchy built by one thread is always the same.
-  handle_->device = rtcNewDevice("threads=1,start_threads=0");
+  // Not "threads=1": Embree would hold all of TBB, and with it the whole program, to one thread.
+  handle_->device = rtcNewDevice("start_threads=0");
   if (handle_->device == nullptr) {
     throw std::runtime_error("ray tracing: Embree cannot start (error " +
                              std::to_string(static_cast<int>(rtcGetDeviceError(nullptr))) + ")");
   }
 }
 
-RayDevice::~RayDevice() { rtcReleaseDevice(handle_->device); }
+RayDevice::~RayDevice() {
+  rtcReleaseDevice(handle_->device);
+}
 
 struct RayMesh::Handle {
   RTCScene scene = nullptr;
@@ -93,14 +97,19 @@ RayMesh::RayMesh(const RayDevice& device, std::span<const Eigen::Vector3f> verti
   rtcSetSceneBuildQuality(handle_->scene, RTC_BUILD_QUALITY_LOW);
   RTCGeometry geometry = rtcNewGeometry(rtc, RTC_GEOMETRY_TYPE_TRIANGLE);
   static_assert(sizeof(Eigen::Vector3f) == 12);
-  void* to = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, vertices.size());
+  void* to =
+      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, vertices.size());
   if (to != nullptr) std::memcpy(to, vertices.data(), vertices.size_bytes());
-  void* index = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, triangles.size());
+  void* index =
+      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, triangles.size());
   if (index != nullptr) std::memcpy(index, triangles.data(), triangles.size_bytes());
   rtcCommitGeometry(geometry);
   rtcAttachGeometry(handle_->scene, geometry);
   rtcReleaseGeometry(geometry);
-  rtcCommitScene(handle_->scene);
+  // An arena of one thread: pictures are what runs in parallel, and a hierarchy that one thread builds is
+  // always the same.
+  tbb::task_arena alone(1);
+  alone.execute([&] { rtcCommitScene(handle_->scene); });
   if (const RTCError error = rtcGetDeviceError(rtc); error != RTC_ERROR_NONE) {
     throw std::runtime_error("ray tracing: Embree refuses a mesh of " + std::to_string(vertices.size()) +
                              " vertices and " + std::to_string(triangles.size()) + " triangles (error " +
@@ -112,8 +121,8 @@ RayMesh::~RayMesh() = default;
 
 void RayMesh::nearest(std::span<const Eigen::Vector3f> directions, std::span<SurfaceHit> hits) const {
   if (hits.size() != directions.size()) {
-    throw std::invalid_argument("nearest: " + std::to_string(directions.size()) + " directions but room for " +
-                                std::to_string(hits.size()) + " hits");
+    throw std::invalid_argument("nearest: " + std::to_string(directions.size()) +
+                                " directions but room for " + std::to_string(hits.size()) + " hits");
   }
   for (std::size_t begin = 0; begin < directions.size(); begin += kPacket) {
     const std::size_t count = std::min(kPacket, directions.size() - begin);
