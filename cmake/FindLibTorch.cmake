@@ -38,10 +38,12 @@ if(LibTorch_FOUND AND NOT TARGET LibTorch::LibTorch)
   list(JOIN _q3d_torch_libs " " _q3d_torch_link)
   add_library(LibTorch::LibTorch INTERFACE IMPORTED)
   # Nothing in our objects names a symbol of torch_cuda, so the linker would drop it and no GPU would be found.
+  # libstdc++ comes first: the wheel's libraries export their own, partly empty copies of std::filesystem, and
+  # the first library that has a symbol wins (std::filesystem::remove_all would jump to address 0).
   set_target_properties(LibTorch::LibTorch PROPERTIES
     INTERFACE_INCLUDE_DIRECTORIES "${LIBTORCH_INCLUDE_DIR};${LIBTORCH_INCLUDE_DIR}/torch/csrc/api/include"
     INTERFACE_SYSTEM_INCLUDE_DIRECTORIES "${LIBTORCH_INCLUDE_DIR};${LIBTORCH_INCLUDE_DIR}/torch/csrc/api/include"
-    INTERFACE_LINK_LIBRARIES "-Wl,--push-state,--no-as-needed ${_q3d_torch_link} -Wl,--pop-state"
+    INTERFACE_LINK_LIBRARIES "-Wl,--push-state,--no-as-needed -lstdc++ ${_q3d_torch_link} -Wl,--pop-state"
     INTERFACE_LINK_OPTIONS "-Wl,-rpath,${LIBTORCH_ROOT}/lib")
   unset(_q3d_torch_libs)
 endif()

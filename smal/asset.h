@@ -3,19 +3,14 @@
 
 #include <torch/torch.h>
 
-#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
 
-namespace q3d::smal {
+#include "smal/sizes.h"
 
-inline constexpr std::int64_t kNumJoints = 35;
-inline constexpr std::int64_t kNumBetas = 41;
-inline constexpr std::int64_t kNumKeypoints = 26;
-inline constexpr std::int64_t kNumVertices = 3889;
-inline constexpr std::int64_t kNumFaces = 7774;
+namespace q3d::smal {
 
 struct SmalAsset {
   torch::Tensor

@@ -1,8 +1,6 @@
 // smal/ against numbers computed by the official code.
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include "smal/body.h"
 #include "smal/camera.h"
 #include "smal/rotation.h"
@@ -58,11 +56,12 @@ TEST_F(SmalParity, Vertices) {
   const torch::Tensor vertices = golden_body().vertices;
   expect_close(vertices.slice(1, 0, vertices.size(1), 8), golden("vertices_every8"));
   expect_close(vertices.slice(0, 0, 2), golden("vertices_first2"));
-  // The sums reach the vertices that the samples above skip. Rounding errors are independent, so they grow
-  // with the square root of the number of vertices.
-  const double summed = kTolerance * std::sqrt(static_cast<double>(vertices.size(1)));
-  expect_close(vertices.to(torch::kFloat64).sum(1), golden("vertex_sum"), summed);
-  expect_close(vertices.to(torch::kFloat64).abs().sum(1), golden("vertex_abs_sum"), summed);
+  // Means over all vertices reach those that the samples above skip. Rounding in the joints moves many
+  // vertices alike, so it does not average out below one float32 step at this size.
+  const auto count = static_cast<double>(vertices.size(1));
+  const torch::Tensor exact = vertices.to(torch::kFloat64);
+  expect_close(exact.mean(1), golden("vertex_sum") / count, 1e-6);
+  expect_close(exact.abs().mean(1), golden("vertex_abs_sum") / count, 1e-6);
 }
 
 TEST_F(SmalParity, Keypoints) {
