@@ -1,13 +1,17 @@
 // SHA-256 digests of bytes and files, and a cache that spares reading unchanged files again.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <span>
 #include <string>
 #include <string_view>
+
+struct evp_md_ctx_st;  // OpenSSL's EVP_MD_CTX
 
 namespace q3d::manifests {
 
@@ -15,13 +19,31 @@ std::string sha256(std::span<const std::byte> bytes);  // 64 lower-case hex digi
 std::string sha256(std::string_view text);
 std::string sha256_file(const std::filesystem::path& path);  // throws std::runtime_error when unreadable
 
+// SHA-256 of bytes that come in pieces.
+class Sha256 {
+ public:
+  Sha256();
+  void update(std::span<const std::byte> bytes);
+  std::string hex();  // 64 lower-case hex digits; call once, at the end
+
+ private:
+  struct Free {
+    void operator()(evp_md_ctx_st* context) const;
+  };
+  std::unique_ptr<evp_md_ctx_st, Free> context_;
+};
+
 // Remembers file digests by path, size, mtime and inode. Thread-safe. `verify` never uses it.
+//
+// A file that was modified less than two seconds before it was digested is not remembered: a later write
+// within the same tick of the file system's clock would leave size and mtime as they were.
 class DigestCache {
  public:
-  explicit DigestCache(
-      std::filesystem::path file);  // loads the file if it is there; a damaged line is dropped
+  // Loads the file if it is there; a damaged line is dropped. Throws std::runtime_error when unreadable.
+  explicit DigestCache(std::filesystem::path file);
   std::string digest(const std::filesystem::path& path);  // throws std::runtime_error when unreadable
-  void save() const;                                      // atomic; throws std::runtime_error
+  // One checked line an entry, sorted by path; atomic. Throws std::runtime_error.
+  void save() const;
 
  private:
   struct Entry {

@@ -37,6 +37,7 @@ struct Box {  // pixels of the source image, top-left origin, width and height
 // The five families of the SMAL shape space; `none` for every other animal.
 enum class Family : std::int8_t { none = -1, felidae = 0, canidae, equidae, bovidae, hippopotamidae };
 std::string_view to_string(Family family);
+Family family_from_string(std::string_view name);  // throws std::invalid_argument on an unknown name
 
 // 3D truth as an annotation file gives it (absent for 2D-only sets).
 struct BodyTruth {
@@ -63,6 +64,7 @@ enum class Reason : std::uint8_t {
   no_visible_keypoints,
   record_malformed,
   image_not_listed,
+  not_a_quadruped,  // left out by the species rule (birds, primates, ...)
   // failed while reading the picture
   image_missing,
   image_empty,

@@ -18,6 +18,7 @@ Verdict verdict_from_string(std::string_view name);  // throws std::invalid_argu
 // `refined` from test-time adaptation; `two_d_only` has keypoints and no body.
 enum class LabelKind : std::uint8_t { truth, retained, refined, two_d_only };
 std::string_view to_string(LabelKind kind);
+LabelKind label_kind_from_string(std::string_view name);  // throws std::invalid_argument on an unknown name
 
 struct Judgement {
   Verdict verdict = Verdict::failed;

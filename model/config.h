@@ -27,13 +27,21 @@ struct PrimaConfig {
   std::int64_t dec_ffn = 5120;
   std::int64_t ief_iterations = 1;
   double focal_px = 1000.0;  // at the 256-px crop
+  // training only
+  double drop_path = 0.55;  // of the last ViT block; rises linearly from 0 at the first
+  double dropout = 0.1;     // in the decoder layers, attention included
+
+  bool operator==(const PrimaConfig&) const = default;
 };
 
 // Named sizes: "vith" (the paper's), "small" and "tiny". Throws std::invalid_argument naming the known ones.
 PrimaConfig named_config(const std::string& name);
 
-// Throws std::invalid_argument on an unknown key (naming the nearest known one), a wrong type or an
-// impossible size (heads that do not divide the width, ...).
+// Throws std::invalid_argument when two sizes do not fit together (heads that do not divide the width, ...).
+void check_config(const PrimaConfig& config);
+
+// Absent keys keep the paper's value. Throws std::invalid_argument on an unknown key (naming the nearest
+// known one), a wrong type, or whatever check_config refuses.
 PrimaConfig config_from_json(const nlohmann::json& json);
 nlohmann::json to_json(const PrimaConfig& config);
 

@@ -4,9 +4,9 @@
 
 #include <torch/torch.h>
 
+#include <cstdint>
 #include <filesystem>
 #include <memory>
-#include <string>
 
 #include "model/config.h"
 #include "smal/body.h"
@@ -15,8 +15,8 @@ namespace q3d::model {
 
 // What the frozen encoders make of a batch of crops; test-time adaptation works from these.
 struct ImageFeatures {
-  torch::Tensor image_tokens;  // (B, 192, D) ViT tokens after the last norm, row-major over 16 x 12
-  torch::Tensor bio_token;     // (B, dec_dim)
+  torch::Tensor image_tokens;  // (B, 192, embed_dim) after the last norm, row-major over 16 x 12 tokens
+  torch::Tensor bio_token;     // (B, embed_dim)
 };
 
 struct Prediction {
@@ -36,13 +36,19 @@ struct Prediction {
 class PrimaNet;  // the torch module, with the official checkpoint's parameter names (model/net.h)
 
 // A loaded network on its device. Copies share the weights. Not thread-safe: one caller at a time.
+//
+// dtype float32, or bfloat16: then the matrices of both encoders, of the decoder layers and of the keypoint
+// readouts are held and multiplied in bfloat16, while the residual streams, layer norms, embeddings, regression
+// heads, the body, the losses and all of test-time adaptation's parameters stay float32.
 class Prima {
  public:
-  // Strict: throws std::runtime_error naming every missing, extra or wrong-shaped tensor. The text tower, the
-  // discriminator, the priors and smal.* buffers are the allowed extras (smal.* must agree with the asset's
-  // shapes).
+  // Strict: throws std::runtime_error naming every missing, extra, wrong-shaped or wrongly typed tensor. The text
+  // tower, the discriminator, the priors and smal.* buffers are the allowed extras (smal.* must agree with the
+  // asset's shapes). The network comes frozen and in evaluation mode. Throws std::invalid_argument on another
+  // dtype.
   static Prima load(const std::filesystem::path& checkpoint, const std::filesystem::path& smal_asset,
                     torch::Device device, torch::ScalarType dtype = torch::kFloat32);
+  // Takes the net as it is. Throws std::invalid_argument when it and the body are on different devices.
   Prima(std::shared_ptr<PrimaNet> net, smal::SmalBody body);
 
   // crops (B, 3, 256, 256) uint8 RGB (any device) -> normalised float input on the network's device.
@@ -50,6 +56,7 @@ class Prima {
   // images (B, 3, 256, 256) float32, normalised.
   ImageFeatures encode(const torch::Tensor& images) const;
   Prediction predict(const ImageFeatures& features, bool with_vertices = false) const;
+  // All three throw std::invalid_argument naming the tensor, got and expected, and record no gradients.
 
   const PrimaConfig& config() const;
   const smal::SmalBody& body() const { return body_; }
@@ -61,10 +68,11 @@ class Prima {
   smal::SmalBody body_;
 };
 
-// A seeded checkpoint of the given sizes: every tensor of the official name list except the text tower. The
-// same seed gives the same bytes. Sets the identity 6D pose (all-zero would give NaN) and the official
-// initial camera.
-void write_initial_checkpoint(const std::filesystem::path& path, const PrimaConfig& config,
-                              std::uint64_t seed);
+// A seeded checkpoint of the given sizes: every tensor of the network under its official name (CLIP's text tower,
+// the discriminator, the priors and the body are not part of it). The same seed gives the same bytes on every
+// machine. Sets the identity 6D pose (all-zero would give NaN) and the official initial camera. dtype: float32,
+// float16 or bfloat16. Throws std::runtime_error when the file cannot be written.
+void write_initial_checkpoint(const std::filesystem::path& path, const PrimaConfig& config, std::uint64_t seed,
+                              torch::ScalarType dtype = torch::kFloat32);
 
 }  // namespace q3d::model

@@ -29,21 +29,25 @@ struct TtaOptions {
 struct TtaSchedule {
   int iterations = 10;
   double stop_below = 0.0;  // stop as soon as L_proj is below this (tau_low); 0 = never
-  double min_gain = 0.0;  // give up after `gain_window` iterations when the relative gain is less; 0 = never
+  double min_gain = 0.0;    // give up after `gain_window` iterations when the relative gain is less; 0 = never
   int gain_window = 10;
 };
 
+// L_proj: mean over visible keypoints and both coordinates of |projected - annotated|.
 struct TtaResult {
-  Prediction best;                          // the iterate of least L_proj, iteration 0 included
-  Prediction last;                          // the iterate after the last step taken
+  Prediction best;  // the iterate of least L_proj, iteration 0 included
+  Prediction last;  // the iterate after the last step taken
+  // An instance's curves are empty where nothing could be measured: no visible keypoint, or a target or a
+  // first prediction that is not finite.
   std::vector<std::vector<double>> l_proj;  // per instance: L_proj of iterates 0..n in crop units
   std::vector<std::vector<double>> loss;    // per instance: the objective at iterates 0..n
   std::vector<int> best_iteration;
 };
 
 // keypoints (B, 26, 3): x, y in crop units and a weight; visible iff weight > 0 (the value is not a weight
-// here). An instance without visible keypoints is left as it is. Throws std::invalid_argument on shapes that
-// disagree.
+// here). schedules: one an instance. An instance without visible keypoints is left as it is. One whose loss or
+// numbers become non-finite keeps its last finite iterate. Vertices are not computed. Throws
+// std::invalid_argument on shapes that disagree, a network in training mode, or options out of range.
 TtaResult adapt(const Prima& prima, const ImageFeatures& features, const torch::Tensor& keypoints,
                 const std::vector<TtaSchedule>& schedules, const TtaOptions& options);
 

@@ -1,0 +1,40 @@
+# Thin calls: every target does what is missing and then its job. The work is in tools/ and in build/quadruped3d.
+PRESET ?= release
+BUILD  := build/$(PRESET)
+OUT    ?= out
+CONFIG ?=
+JOBS   ?= $(shell nproc)
+
+.PHONY: quadruped3d test build setup configure sample format bench asan clean help
+
+quadruped3d: build  ## build the dataset that CONFIG describes (default: the rendered sample world)
+	tools/quadruped3d.sh $(OUT) $(CONFIG)
+
+test: build  ## build everything and run all tests
+	ctest --test-dir $(BUILD) --output-on-failure
+
+build: $(BUILD)/build.ninja  ## compile (release unless PRESET says otherwise)
+	@cmake --build $(BUILD) --parallel $(JOBS)
+	@ln -sfn $(PRESET)/pipeline/quadruped3d build/quadruped3d
+
+setup:  ## install Debian packages and LibTorch where they are missing
+	@tools/setup.sh
+
+$(BUILD)/build.ninja: | setup
+	cmake --preset $(PRESET) $(CMAKE_ARGS)
+
+bench: setup  ## build the benchmarks (bench/README.md says how to run them)
+	cmake --preset $(PRESET) -DQ3D_BENCH=ON
+	cmake --build $(BUILD) --parallel $(JOBS)
+
+asan:  ## all tests under the address and undefined-behaviour sanitizers
+	$(MAKE) test PRESET=asan
+
+format:  ## format every source in place
+	git ls-files '*.h' '*.cpp' | xargs clang-format -i
+
+clean:  ## remove what was compiled
+	rm -rf build
+
+help:  ## this list
+	@grep -hE '^[a-z0-9]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 16

@@ -1,0 +1,89 @@
+#include "manifests/atomic_file.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <stdexcept>
+#include <system_error>
+
+#include "manifests/file_descriptor.h"
+
+namespace q3d::manifests {
+namespace {
+
+namespace fs = std::filesystem;
+
+// In the target's folder, because rename works only within a file system. Process and counter keep two
+// writers of one path apart.
+fs::path temporary_name(const fs::path& path) {
+  static std::atomic<unsigned> counter{0};
+  return path.parent_path() / fmt::format("{}.{}.{}.tmp", path.filename().string(), ::getpid(), counter++);
+}
+
+class RemoveOnFailure {
+ public:
+  explicit RemoveOnFailure(const fs::path& path) : path_(path) {}
+  ~RemoveOnFailure() {
+    if (armed_) ::unlink(path_.c_str());
+  }
+  RemoveOnFailure(const RemoveOnFailure&) = delete;
+  RemoveOnFailure& operator=(const RemoveOnFailure&) = delete;
+  void disarm() { armed_ = false; }
+
+ private:
+  const fs::path& path_;
+  bool armed_ = true;
+};
+
+}  // namespace
+
+void write_file_atomically(const fs::path& path, std::span<const std::byte> content) {
+  const fs::path temporary = temporary_name(path);
+  RemoveOnFailure guard(temporary);
+  FileDescriptor file(temporary, O_WRONLY | O_CREAT | O_EXCL);
+  file.write_all(content);
+  file.sync();
+  file.close();
+  if (::rename(temporary.c_str(), path.c_str()) != 0) throw_errno("rename a finished file to", path);
+  guard.disarm();
+  sync_folder(path.parent_path());
+}
+
+void write_file_atomically(const fs::path& path, std::string_view content) {
+  write_file_atomically(path, std::as_bytes(std::span(content)));
+}
+
+void commit_file(const fs::path& temporary, const fs::path& path) {
+  RemoveOnFailure guard(temporary);
+  FileDescriptor file(temporary, O_RDWR);
+  file.sync();
+  file.close();
+  if (::rename(temporary.c_str(), path.c_str()) != 0) throw_errno("rename a finished file to", path);
+  guard.disarm();
+  sync_folder(path.parent_path());
+}
+
+std::string read_file(const fs::path& path) {
+  const FileDescriptor file(path, O_RDONLY);
+  std::string content(file.size(), '\0');
+  file.read_at(0, std::as_writable_bytes(std::span(content)));
+  return content;
+}
+
+void sync_folder(const fs::path& folder) {
+  FileDescriptor(folder.empty() ? fs::path(".") : folder, O_RDONLY | O_DIRECTORY).sync();
+}
+
+void remove_temporaries(const fs::path& folder) {
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+    if (entry->path().extension() == ".tmp" && entry->is_regular_file()) fs::remove(entry->path());
+  }
+  if (error) {
+    throw std::runtime_error(fmt::format("cannot list {}: {}", folder.string(), error.message()));
+  }
+}
+
+}  // namespace q3d::manifests

@@ -1,0 +1,110 @@
+#include <fmt/format.h>
+#include <sys/stat.h>
+
+#include <charconv>
+#include <chrono>
+#include <optional>
+
+#include "manifests/atomic_file.h"
+#include "manifests/checked_line.h"
+#include "manifests/digest.h"
+#include "manifests/file_descriptor.h"
+
+namespace q3d::manifests {
+namespace {
+
+constexpr std::int64_t kNsPerSecond = 1'000'000'000;
+constexpr std::int64_t kRacyNs = 2 * kNsPerSecond;  // FAT's mtime ticks every two seconds
+
+struct FileState {
+  std::uint64_t size = 0;
+  std::int64_t mtime_ns = 0;
+  std::uint64_t inode = 0;
+  bool operator==(const FileState&) const = default;
+};
+
+FileState state_of(const std::filesystem::path& path) {
+  struct stat status {};
+  if (::stat(path.c_str(), &status) != 0) throw_errno("inspect", path);
+  return {static_cast<std::uint64_t>(status.st_size),
+          status.st_mtim.tv_sec * kNsPerSecond + status.st_mtim.tv_nsec, status.st_ino};
+}
+
+std::int64_t now_ns() {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(now).count();
+}
+
+// Cuts the next space-separated field off `text`.
+std::string_view next_field(std::string_view& text) {
+  const std::size_t space = std::min(text.find(' '), text.size());
+  const std::string_view field = text.substr(0, space);
+  text.remove_prefix(std::min(space + 1, text.size()));
+  return field;
+}
+
+template <typename Integer>
+bool parse(std::string_view text, Integer& value) {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return error == std::errc() && end == text.data() + text.size();
+}
+
+}  // namespace
+
+DigestCache::DigestCache(std::filesystem::path file) : file_(std::move(file)) {
+  if (!std::filesystem::exists(file_)) return;
+  const std::string content = read_file(file_);
+  std::string_view rest = content;
+  while (!rest.empty()) {
+    const std::size_t end = std::min(rest.find('\n'), rest.size());
+    const auto payload = open_line(rest.substr(0, end));
+    rest.remove_prefix(std::min(end + 1, rest.size()));
+    if (!payload) continue;
+    std::string_view fields = *payload;
+    Entry entry;
+    entry.sha256 = next_field(fields);
+    if (entry.sha256.size() == 64 && parse(next_field(fields), entry.size) &&
+        parse(next_field(fields), entry.mtime_ns) && parse(next_field(fields), entry.inode) &&
+        !fields.empty()) {
+      entries_.insert_or_assign(std::string(fields), std::move(entry));
+    }
+  }
+}
+
+std::string DigestCache::digest(const std::filesystem::path& path) {
+  const std::string key = std::filesystem::absolute(path).lexically_normal().string();
+  const FileState before = state_of(path);
+  {
+    const std::lock_guard lock(mutex_);
+    const auto found = entries_.find(key);
+    if (found != entries_.end()) {
+      const Entry& entry = found->second;
+      if (FileState{entry.size, entry.mtime_ns, entry.inode} == before) return entry.sha256;
+    }
+  }
+  const std::int64_t started_ns = now_ns();
+  std::string digest = sha256_file(path);
+  const bool settled = before.mtime_ns < started_ns - kRacyNs && state_of(path) == before;
+  const bool fits_a_line = key.find('\n') == std::string::npos;
+  const std::lock_guard lock(mutex_);
+  if (settled && fits_a_line) {
+    entries_.insert_or_assign(key, Entry{before.size, before.mtime_ns, before.inode, digest});
+  } else {
+    entries_.erase(key);
+  }
+  return digest;
+}
+
+void DigestCache::save() const {
+  std::string content;
+  {
+    const std::lock_guard lock(mutex_);
+    for (const auto& [path, entry] : entries_) {
+      content += seal_line(
+          fmt::format("{} {} {} {} {}", entry.sha256, entry.size, entry.mtime_ns, entry.inode, path));
+    }
+  }
+  write_file_atomically(file_, content);
+}
+
+}  // namespace q3d::manifests

@@ -1,0 +1,118 @@
+#include "manifests/journal.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <string_view>
+
+#include "manifests/atomic_file.h"
+#include "manifests/checked_line.h"
+#include "manifests/file_descriptor.h"
+
+namespace q3d::manifests {
+namespace {
+
+bool stays_in_folder(const std::filesystem::path& file) {
+  return file.is_relative() && std::find(file.begin(), file.end(), "..") == file.end();
+}
+
+std::string to_payload(const JournalEntry& entry) {
+  return nlohmann::ordered_json{{"unit", entry.unit},     {"input", entry.input_digest}, {"file", entry.file},
+                                {"sha256", entry.sha256}, {"bytes", entry.bytes},        {"rows", entry.rows}}
+      .dump();
+}
+
+// Nothing for a line that is not a whole journal line.
+std::optional<JournalEntry> parse_line(std::string_view line) {
+  const auto payload = open_line(line);
+  if (!payload) return std::nullopt;
+  try {
+    const auto json = nlohmann::json::parse(*payload);
+    JournalEntry entry{json.at("unit").get<std::int64_t>(),  json.at("input").get<std::string>(),
+                       json.at("file").get<std::string>(),   json.at("sha256").get<std::string>(),
+                       json.at("bytes").get<std::int64_t>(), json.at("rows").get<std::int64_t>()};
+    if (!stays_in_folder(entry.file)) return std::nullopt;
+    return entry;
+  } catch (const nlohmann::json::exception&) {
+    return std::nullopt;
+  }
+}
+
+}  // namespace
+
+Journal::Journal(std::filesystem::path file) : file_(std::move(file)) {
+  if (!std::filesystem::exists(file_)) return;
+  const std::string content = read_file(file_);
+  file_bytes_ = content.size();
+  std::int64_t line_number = 0;
+  while (whole_bytes_ < content.size()) {
+    ++line_number;
+    const std::size_t end = content.find('\n', whole_bytes_);
+    const bool is_last = end == std::string::npos || end + 1 == content.size();
+    auto entry = end == std::string::npos
+                     ? std::nullopt
+                     : parse_line(std::string_view(content).substr(whole_bytes_, end - whole_bytes_));
+    if (!entry) {
+      if (!is_last) {
+        throw std::runtime_error(
+            fmt::format("{}, line {}: damaged (its checksum or its fields do not match). Delete this line "
+                        "and build again: "
+                        "the unit it stood for will be made anew.",
+                        file_.string(), line_number));
+      }
+      dropped_torn_line_ = true;
+      return;
+    }
+    const std::int64_t unit = entry->unit;
+    entries_.insert_or_assign(unit, std::move(*entry));
+    whole_bytes_ = end + 1;
+  }
+}
+
+std::optional<JournalEntry> Journal::find(std::int64_t unit, const std::string& input_digest) const {
+  const auto found = entries_.find(unit);
+  if (found == entries_.end() || found->second.input_digest != input_digest) return std::nullopt;
+  const JournalEntry& entry = found->second;
+  if (!entry.file.empty()) {
+    std::error_code error;
+    const auto size = std::filesystem::file_size(file_.parent_path() / entry.file, error);
+    if (error || size != static_cast<std::uintmax_t>(entry.bytes)) return std::nullopt;
+  }
+  return entry;
+}
+
+void Journal::append(const JournalEntry& entry) {
+  if (!stays_in_folder(entry.file)) {
+    throw std::invalid_argument(fmt::format("{}: a journal entry's file must stay in the folder, got {}",
+                                            file_.string(), entry.file));
+  }
+  const std::string line = seal_line(to_payload(entry));
+  const bool is_new = !std::filesystem::exists(file_);
+  FileDescriptor file(file_, O_WRONLY | O_CREAT | O_APPEND);
+  if (file.size() != file_bytes_) {
+    throw std::runtime_error(
+        fmt::format("{}: grew from {} to {} bytes behind this process's back. Another build "
+                    "writes it: end one of the two.",
+                    file_.string(), file_bytes_, file.size()));
+  }
+  const auto cut = [&] { return ::ftruncate(file.get(), static_cast<off_t>(whole_bytes_)) == 0; };
+  if (file_bytes_ != whole_bytes_ && !cut()) throw_errno("cut a torn line off", file_);
+  try {
+    file.write_all(line);
+    file.sync();
+    file.close();
+    if (is_new) sync_folder(file_.parent_path());
+  } catch (...) {
+    if (file.get() >= 0 && cut()) file_bytes_ = whole_bytes_;
+    throw;
+  }
+  whole_bytes_ += line.size();
+  file_bytes_ = whole_bytes_;
+  entries_.insert_or_assign(entry.unit, entry);
+}
+
+}  // namespace q3d::manifests

@@ -1,0 +1,83 @@
+#include "manifests/table.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <stdexcept>
+
+namespace q3d::manifests {
+namespace {
+
+struct TypeFacts {
+  std::string_view name;
+  std::size_t size;
+};
+// In the order of ElementType.
+constexpr std::array<TypeFacts, 6> kTypes{
+    {{"float32", 4}, {"float64", 8}, {"int8", 1}, {"uint8", 1}, {"int32", 4}, {"int64", 8}}};
+static_assert(kTypes.size() == static_cast<std::size_t>(ElementType::int64) + 1);
+
+}  // namespace
+
+std::size_t size_of(ElementType type) {
+  return kTypes.at(static_cast<std::size_t>(type)).size;
+}
+std::string_view to_string(ElementType type) {
+  return kTypes.at(static_cast<std::size_t>(type)).name;
+}
+
+std::int64_t elements_per_row(const std::vector<std::int64_t>& row_shape) {
+  std::int64_t count = 1;
+  for (const std::int64_t extent : row_shape) count *= extent;
+  return count;
+}
+
+template <typename T>
+std::span<const T> NumericColumn::as() const {
+  if (type != element_type<T>::value) {
+    throw std::logic_error(
+        fmt::format("the column is {}, not {}", to_string(type), to_string(element_type<T>::value)));
+  }
+  return {reinterpret_cast<const T*>(data.data()), data.size() / sizeof(T)};
+}
+
+template <typename T>
+void Table::add(const std::string& name, std::vector<std::int64_t> row_shape, std::span<const T> values) {
+  const std::int64_t expected = rows * elements_per_row(row_shape);
+  if (static_cast<std::int64_t>(values.size()) != expected) {
+    throw std::logic_error(
+        fmt::format("column {}: got {} numbers, expected {}", name, values.size(), expected));
+  }
+  const auto bytes = std::as_bytes(values);
+  NumericColumn column{element_type<T>::value, std::move(row_shape), {bytes.begin(), bytes.end()}};
+  if (!numeric.emplace(name, std::move(column)).second) {
+    throw std::logic_error(fmt::format("column {} is there already", name));
+  }
+}
+
+template <typename T>
+std::span<const T> Table::column(const std::string& name) const {
+  const auto found = numeric.find(name);
+  if (found == numeric.end())
+    throw std::runtime_error(fmt::format("the table has no numeric column {}", name));
+  if (found->second.type != element_type<T>::value) {
+    throw std::runtime_error(fmt::format("column {}: got {}, expected {}", name,
+                                         to_string(found->second.type), to_string(element_type<T>::value)));
+  }
+  return found->second.as<T>();
+}
+
+#define Q3D_INSTANTIATE(T)                                                                        \
+  template std::span<const T> NumericColumn::as<T>() const;                                       \
+  template void Table::add<T>(const std::string&, std::vector<std::int64_t>, std::span<const T>); \
+  template std::span<const T> Table::column<T>(const std::string&) const;
+Q3D_INSTANTIATE(float)
+Q3D_INSTANTIATE(double)
+Q3D_INSTANTIATE(std::int8_t)
+Q3D_INSTANTIATE(std::uint8_t)
+Q3D_INSTANTIATE(std::int32_t)
+Q3D_INSTANTIATE(std::int64_t)
+#undef Q3D_INSTANTIATE
+
+}  // namespace q3d::manifests

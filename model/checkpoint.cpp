@@ -1,0 +1,154 @@
+#include "model/checkpoint.h"
+
+#include <fmt/format.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <string_view>
+
+namespace q3d::model {
+namespace {
+
+constexpr const char* kConfigKey = "prima_config";
+
+std::string shape_text(at::IntArrayRef shape) {
+  std::string text = "[";
+  for (const std::int64_t extent : shape) text += (text.size() > 1 ? ", " : "") + std::to_string(extent);
+  return text + "]";
+}
+
+bool is_float(torch::ScalarType type) {
+  return type == torch::kFloat32 || type == torch::kFloat16 || type == torch::kBFloat16;
+}
+
+// The body's buffers in an official checkpoint, by their names there.
+std::map<std::string, torch::Tensor> body_buffers(const smal::SmalAsset& asset) {
+  return {{"smal.shapedirs", asset.shapedirs},     {"smal.v_template", asset.v_template},
+          {"smal.posedirs", asset.posedirs},       {"smal.J_regressor", asset.j_regressor},
+          {"smal.lbs_weights", asset.lbs_weights}, {"smal.faces", asset.faces},
+          {"smal.parents", asset.parents}};
+}
+
+void check_entry(const std::string& name, const torch::Tensor& got, at::IntArrayRef expected,
+                 std::vector<std::string>& faults) {
+  if (got.sizes() != expected) {
+    faults.push_back(
+        fmt::format("{}: shape {}, expected {}", name, shape_text(got.sizes()), shape_text(expected)));
+  }
+}
+
+// Every way in which the file differs from the network, one line each.
+std::vector<std::string> find_faults(const smal::SafeTensors& file, const PrimaNet& net,
+                                     const smal::SmalAsset& asset) {
+  std::vector<std::string> faults;
+  const auto parameters = net.named_parameters();
+  for (const auto& parameter : parameters) {
+    if (!file.contains(parameter.key())) {
+      faults.push_back(fmt::format("{}: missing, expected {}", parameter.key(),
+                                   shape_text(parameter.value().sizes())));
+      continue;
+    }
+    const torch::Tensor stored = file.tensor(parameter.key());
+    check_entry(parameter.key(), stored, parameter.value().sizes(), faults);
+    if (!is_float(stored.scalar_type())) {
+      faults.push_back(fmt::format("{}: dtype {}, expected float32, float16 or bfloat16", parameter.key(),
+                                   torch::toString(stored.scalar_type())));
+    }
+  }
+  const auto buffers = body_buffers(asset);
+  for (const std::string& name : file.names()) {
+    if (parameters.contains(name)) continue;
+    if (const auto buffer = buffers.find(name); buffer != buffers.end()) {
+      check_entry(name, file.tensor(name), buffer->second.sizes(), faults);
+    } else if (!is_allowed_extra(name)) {
+      faults.push_back(name + ": not part of the network");
+    }
+  }
+  return faults;
+}
+
+// Drops the file's pages from this process once their numbers are copied; the kernel's cache keeps them. Without
+// this the mapping of a full-size file counts as a second copy of the weights.
+void release_pages(const torch::Tensor& mapped) {
+  const auto page = static_cast<std::uintptr_t>(::sysconf(_SC_PAGESIZE));
+  const auto begin = reinterpret_cast<std::uintptr_t>(mapped.const_data_ptr());
+  const std::uintptr_t first = (begin + page - 1) / page * page;
+  const std::uintptr_t last = (begin + mapped.nbytes()) / page * page;
+  if (first < last) ::madvise(reinterpret_cast<void*>(first), last - first, MADV_DONTNEED);
+}
+
+}  // namespace
+
+std::vector<TensorSpec> expected_tensors(const PrimaConfig& config) {
+  const PrimaNet net(config, {torch::kMeta, torch::kFloat32});
+  std::vector<TensorSpec> specs;
+  for (const auto& parameter : net.named_parameters()) {
+    specs.push_back({parameter.key(), parameter.value().sizes().vec()});
+  }
+  return specs;
+}
+
+bool is_allowed_extra(const std::string& name) {
+  static constexpr std::string_view kText = "bioclip_embedding.species_model.";
+  static constexpr std::array<std::string_view, 7> kTextTower{
+      "transformer.", "token_embedding.", "positional_embedding", "ln_final.",
+      "text_projection", "logit_scale",   "attn_mask"};
+  static constexpr std::array<std::string_view, 4> kOthers{"smal.", "discriminator.", "shape_prior_loss.",
+                                                           "pose_prior_loss."};
+  const std::string_view view(name);
+  const auto starts = [](std::string_view text) {
+    return [text](std::string_view prefix) { return text.substr(0, prefix.size()) == prefix; };
+  };
+  if (view == "initialized") return true;
+  if (view.substr(0, kText.size()) == kText) {
+    return std::any_of(kTextTower.begin(), kTextTower.end(), starts(view.substr(kText.size())));
+  }
+  return std::any_of(kOthers.begin(), kOthers.end(), starts(view));
+}
+
+PrimaConfig checkpoint_config(const smal::SafeTensors& file) {
+  const auto entry = file.metadata().find(kConfigKey);
+  if (entry == file.metadata().end()) {
+    throw std::runtime_error(
+        fmt::format("{}: no '{}' in the metadata, so the network's sizes are unknown; import official weights "
+                    "with tools/import_assets.py",
+                    file.path().string(), kConfigKey));
+  }
+  try {
+    return config_from_json(nlohmann::json::parse(entry->second));
+  } catch (const std::exception& error) {
+    throw std::runtime_error(
+        fmt::format("{}: metadata '{}': {}", file.path().string(), kConfigKey, error.what()));
+  }
+}
+
+std::shared_ptr<PrimaNet> load_net(const smal::SafeTensors& file, const PrimaConfig& config,
+                                   const smal::SmalAsset& asset, const Placement& placement) {
+  const torch::NoGradGuard no_grad;
+  const PrimaNet plan(config, {torch::kMeta, placement.matrix_dtype});
+  if (const auto faults = find_faults(file, plan, asset); !faults.empty()) {
+    std::string message = fmt::format("{}: {} tensors do not fit the network:", file.path().string(),
+                                      faults.size());
+    for (const std::string& fault : faults) message += "\n  " + fault;
+    throw std::runtime_error(message);
+  }
+  auto net = std::make_shared<PrimaNet>(config, placement);
+  for (auto& parameter : net->named_parameters()) {
+    const torch::Tensor stored = file.tensor(parameter.key());
+    parameter.value().copy_(stored);
+    release_pages(stored);
+  }
+  return net;
+}
+
+void write_checkpoint(const std::filesystem::path& path, const PrimaConfig& config,
+                      const smal::NamedTensors& tensors) {
+  smal::write_safetensors(path, tensors, {{kConfigKey, to_json(config).dump()}});
+}
+
+}  // namespace q3d::model

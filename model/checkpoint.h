@@ -1,0 +1,47 @@
+// Reading and writing network weights as safetensors under the official names. The sizes travel in the file's
+// metadata, as JSON under "prima_config".
+#pragma once
+
+#include <torch/torch.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "model/config.h"
+#include "model/layers.h"
+#include "model/net.h"
+#include "smal/asset.h"
+#include "smal/safetensors.h"
+
+namespace q3d::model {
+
+struct TensorSpec {
+  std::string name;
+  std::vector<std::int64_t> shape;
+  bool operator==(const TensorSpec&) const = default;
+};
+
+// Every tensor of the network in the module's order, without allocating any.
+std::vector<TensorSpec> expected_tensors(const PrimaConfig& config);
+
+// True for what a checkpoint may carry although the network does not hold it: CLIP's text tower,
+// discriminator.*, the priors, `initialized` and smal.*.
+bool is_allowed_extra(const std::string& name);
+
+// The config in the file's metadata. Throws std::runtime_error when it is absent or not valid.
+PrimaConfig checkpoint_config(const smal::SafeTensors& file);
+
+// Builds the network and copies the weights in, casting float16 and bfloat16 files. Strict: throws
+// std::runtime_error that names every missing, extra, wrong-shaped or wrongly typed tensor; smal.* must have
+// the asset's shapes. At no time are two full copies in memory.
+std::shared_ptr<PrimaNet> load_net(const smal::SafeTensors& file, const PrimaConfig& config,
+                                   const smal::SmalAsset& asset, const Placement& placement);
+
+// Writes the tensors with the config in the metadata. Throws std::runtime_error.
+void write_checkpoint(const std::filesystem::path& path, const PrimaConfig& config,
+                      const smal::NamedTensors& tensors);
+
+}  // namespace q3d::model

@@ -1,0 +1,164 @@
+#include "model/config.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numeric>
+#include <stdexcept>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+namespace q3d::model {
+namespace {
+
+using Member =
+    std::variant<std::int64_t PrimaConfig::*, double PrimaConfig::*, bool PrimaConfig::*>;
+
+struct Field {
+  std::string_view key;
+  Member member;
+};
+
+constexpr std::array kFields{
+    Field{"embed_dim", &PrimaConfig::embed_dim},
+    Field{"depth", &PrimaConfig::depth},
+    Field{"heads", &PrimaConfig::heads},
+    Field{"mlp_ratio", &PrimaConfig::mlp_ratio},
+    Field{"clip_width", &PrimaConfig::clip_width},
+    Field{"clip_layers", &PrimaConfig::clip_layers},
+    Field{"clip_heads", &PrimaConfig::clip_heads},
+    Field{"clip_out", &PrimaConfig::clip_out},
+    Field{"clip_quick_gelu", &PrimaConfig::clip_quick_gelu},
+    Field{"dec_dim", &PrimaConfig::dec_dim},
+    Field{"dec_layers", &PrimaConfig::dec_layers},
+    Field{"dec_heads", &PrimaConfig::dec_heads},
+    Field{"dec_ffn", &PrimaConfig::dec_ffn},
+    Field{"ief_iterations", &PrimaConfig::ief_iterations},
+    Field{"focal_px", &PrimaConfig::focal_px},
+    Field{"drop_path", &PrimaConfig::drop_path},
+    Field{"dropout", &PrimaConfig::dropout},
+};
+
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t replaced = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
+      diagonal = row[j];
+      row[j] = std::min({row[j] + 1, row[j - 1] + 1, replaced});
+    }
+  }
+  return row[b.size()];
+}
+
+const Field& find_field(const std::string& key) {
+  const auto nearest = std::min_element(kFields.begin(), kFields.end(), [&](const Field& a, const Field& b) {
+    return edit_distance(key, a.key) < edit_distance(key, b.key);
+  });
+  if (nearest->key != key) {
+    throw std::invalid_argument(
+        fmt::format("model config: unknown key '{}'; did you mean '{}'?", key, nearest->key));
+  }
+  return *nearest;
+}
+
+void require_type(const std::string& key, const nlohmann::json& value, bool fits, std::string_view expected) {
+  if (!fits) {
+    throw std::invalid_argument(
+        fmt::format("model config: '{}' must be {}, got {}", key, expected, value.dump()));
+  }
+}
+
+void require(bool holds, const std::string& message) {
+  if (!holds) throw std::invalid_argument("model config: " + message);
+}
+
+void require_divides(std::string_view part, std::int64_t divisor, std::string_view whole,
+                     std::int64_t dividend) {
+  require(dividend % divisor == 0,
+          fmt::format("'{}' = {} does not divide '{}' = {}", part, divisor, whole, dividend));
+}
+
+}  // namespace
+
+PrimaConfig named_config(const std::string& name) {
+  PrimaConfig config;
+  if (name == "vith") return config;
+  if (name == "small") {  // about 5.6 M parameters: trains on two CPU cores, 11 MB in half precision
+    config.embed_dim = 192, config.depth = 6, config.heads = 3;
+    config.clip_width = 128, config.clip_layers = 3, config.clip_heads = 4, config.clip_out = 128;
+    config.dec_dim = 192, config.dec_layers = 3, config.dec_heads = 6, config.dec_ffn = 512;
+    config.drop_path = 0.1;  // six blocks cannot spare half of themselves
+    return config;
+  }
+  if (name == "tiny") {
+    config.embed_dim = 64, config.depth = 2, config.heads = 4;
+    config.clip_width = 64, config.clip_layers = 2, config.clip_heads = 4, config.clip_out = 32;
+    config.dec_dim = 64, config.dec_layers = 2, config.dec_heads = 4, config.dec_ffn = 256;
+    return config;
+  }
+  throw std::invalid_argument(
+      fmt::format("model size '{}' is unknown; known sizes: vith, small, tiny", name));
+}
+
+void check_config(const PrimaConfig& config) {
+  constexpr std::int64_t kLargest = 1 << 16;  // far above any real width; keeps products inside 64 bits
+  for (const Field& field : kFields) {
+    if (const auto* size = std::get_if<std::int64_t PrimaConfig::*>(&field.member)) {
+      require(config.**size >= 1 && config.**size <= kLargest,
+              fmt::format("'{}' = {} lies outside [1, {}]", field.key, config.**size, kLargest));
+    }
+  }
+  require_divides("heads", config.heads, "embed_dim", config.embed_dim);
+  require_divides("clip_heads", config.clip_heads, "clip_width", config.clip_width);
+  require_divides("dec_heads", config.dec_heads, "dec_dim", config.dec_dim);
+  // The position encoding holds a sine and a cosine for each of two axes.
+  require(config.dec_dim % 4 == 0, fmt::format("'dec_dim' = {} is no multiple of 4", config.dec_dim));
+  // Keypoints are read after every layer but the last, so one layer alone would predict none.
+  require(config.dec_layers >= 2, "'dec_layers' must be at least 2");
+  require(std::isfinite(config.focal_px) && config.focal_px > 0.0,
+          fmt::format("'focal_px' = {} is not a positive length", config.focal_px));
+  for (const double rate : {config.drop_path, config.dropout}) {
+    require(rate >= 0.0 && rate < 1.0,
+            fmt::format("'drop_path' and 'dropout' must lie in [0, 1), got {}", rate));
+  }
+}
+
+PrimaConfig config_from_json(const nlohmann::json& json) {
+  if (!json.is_object()) {
+    throw std::invalid_argument(fmt::format("model config: expected an object, got {}", json.type_name()));
+  }
+  PrimaConfig config;
+  for (const auto& [key, value] : json.items()) {
+    const Member member = find_field(key).member;
+    if (const auto* size = std::get_if<std::int64_t PrimaConfig::*>(&member)) {
+      require_type(key, value, value.is_number_integer(), "an integer");
+      config.**size = value.get<std::int64_t>();
+    } else if (const auto* real = std::get_if<double PrimaConfig::*>(&member)) {
+      require_type(key, value, value.is_number(), "a number");
+      config.**real = value.get<double>();
+    } else {
+      require_type(key, value, value.is_boolean(), "true or false");
+      config.*std::get<bool PrimaConfig::*>(member) = value.get<bool>();
+    }
+  }
+  check_config(config);
+  return config;
+}
+
+nlohmann::json to_json(const PrimaConfig& config) {
+  nlohmann::json json = nlohmann::json::object();
+  for (const Field& field : kFields) {
+    std::visit([&](auto member) { json[std::string(field.key)] = config.*member; }, field.member);
+  }
+  return json;
+}
+
+}  // namespace q3d::model

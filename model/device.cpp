@@ -1,0 +1,114 @@
+#include "model/device.h"
+
+#include <ATen/Context.h>
+#include <ATen/Parallel.h>
+#include <dlfcn.h>
+#include <fmt/format.h>
+
+#include <array>
+#include <charconv>
+#include <filesystem>
+#include <optional>
+#include <stdexcept>
+
+namespace q3d::model {
+namespace {
+
+// The driver's own name of a device. LibTorch's header for it needs a CUDA toolkit, the driver library does
+// not, and like LibTorch it honours CUDA_VISIBLE_DEVICES.
+std::string cuda_device_name(int index) {
+  void* driver = ::dlopen("libcuda.so.1", RTLD_LAZY | RTLD_LOCAL);
+  if (driver == nullptr) return "unknown device";
+  const auto init = reinterpret_cast<int (*)(unsigned)>(::dlsym(driver, "cuInit"));
+  const auto get = reinterpret_cast<int (*)(int*, int)>(::dlsym(driver, "cuDeviceGet"));
+  const auto get_name = reinterpret_cast<int (*)(char*, int, int)>(::dlsym(driver, "cuDeviceGetName"));
+  std::array<char, 128> name{};
+  int device = 0;
+  const bool known = init != nullptr && get != nullptr && get_name != nullptr && init(0) == 0 &&
+                     get(&device, index) == 0 &&
+                     get_name(name.data(), static_cast<int>(name.size()) - 1, device) == 0;
+  ::dlclose(driver);
+  return known ? std::string(name.data()) : "unknown device";
+}
+
+bool nvidia_gpu_present() {
+  std::error_code ignored;
+  return std::filesystem::exists("/dev/nvidia0", ignored) ||
+         std::filesystem::exists("/proc/driver/nvidia/version", ignored);
+}
+
+// Nothing when the device works; else the reason, found by using it.
+std::optional<std::string> why_unusable(int index) {
+  try {
+    const torch::Device device(torch::kCUDA, static_cast<torch::DeviceIndex>(index));
+    if (torch::ones({2}, torch::TensorOptions(device)).sum().item<float>() == 2.0F) return std::nullopt;
+    return "it computes wrong sums";
+  } catch (const c10::Error& error) {
+    return error.what_without_backtrace();
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+}
+
+DeviceChoice cpu_choice() {
+  return {torch::kCPU, fmt::format("cpu ({} threads)", at::get_num_threads()), ""};
+}
+
+DeviceChoice cuda_choice(int index) {
+  return {torch::Device(torch::kCUDA, static_cast<torch::DeviceIndex>(index)),
+          fmt::format("cuda:{} {}", index, cuda_device_name(index)), ""};
+}
+
+// "cuda" -> 0, "cuda:3" -> 3, anything else -> nothing.
+std::optional<int> cuda_index(const std::string& name) {
+  if (name == "cuda") return 0;
+  if (name.rfind("cuda:", 0) != 0) return std::nullopt;
+  int index = -1;
+  const char* end = name.data() + name.size();
+  const auto [stop, error] = std::from_chars(name.data() + 5, end, index);
+  if (error != std::errc{} || stop != end || index < 0 || index > 127) return std::nullopt;
+  return index;
+}
+
+}  // namespace
+
+DeviceChoice choose_device(const std::string& name) {
+  if (name == "cpu") return cpu_choice();
+  if (name == "auto") {
+    if (!nvidia_gpu_present() && !torch::cuda::is_available()) return cpu_choice();
+    const auto reason = why_unusable(0);
+    if (!reason) return cuda_choice(0);
+    DeviceChoice choice = cpu_choice();
+    choice.warning = "a GPU is present but cannot be used, so the CPU is: " + *reason;
+    return choice;
+  }
+  const auto index = cuda_index(name);
+  if (!index) {
+    throw std::invalid_argument(
+        fmt::format("device '{}' is unknown; use auto, cpu, cuda or cuda:<number>", name));
+  }
+  if (const auto reason = why_unusable(*index)) {
+    throw std::runtime_error(fmt::format(
+        "device '{}' cannot be used ({} CUDA devices found): {}; use cpu or auto", name,
+        torch::cuda::device_count(), *reason));
+  }
+  return cuda_choice(*index);
+}
+
+void configure_compute(int threads) {
+  if (threads < 1) {
+    throw std::invalid_argument(fmt::format("compute threads must be at least 1, got {}", threads));
+  }
+  at::set_num_threads(threads);
+  at::Context& context = at::globalContext();
+  // Operators without a deterministic form warn instead of failing, and fresh memory is not filled.
+  context.setDeterministicAlgorithms(true, /*warn_only=*/true);
+  context.setDeterministicFillUninitializedMemory(false);
+  context.setSDPUseMemEfficient(false);  // its backward pass adds in any order
+  context.setDeterministicCuDNN(true);
+  context.setBenchmarkCuDNN(false);
+  context.setAllowTF32CuDNN(false);
+  context.setFloat32MatmulPrecision("highest");
+}
+
+}  // namespace q3d::model

@@ -1,0 +1,27 @@
+#include "model/net.h"
+
+namespace q3d::model {
+namespace {
+
+// The ViT sees the middle 192 columns of the crop, BioCLIP all 256.
+constexpr std::int64_t kFirstColumnPx = 32;
+constexpr std::int64_t kColumnsPx = 192;
+
+}  // namespace
+
+PrimaNet::PrimaNet(const PrimaConfig& config, const Placement& placement)
+    : config_(config), placement_(placement) {
+  check_config(config);
+  backbone_ = register_module("backbone", std::make_shared<Vit>(config, placement));
+  decoder_ = register_module("smal_head", std::make_shared<Decoder>(config, placement));
+  bioclip_ = register_module("bioclip_embedding", std::make_shared<BioClip>(config, placement));
+}
+
+ImageFeatures PrimaNet::encode(const torch::Tensor& images, const Observer& observe) const {
+  ImageFeatures features;
+  features.image_tokens = backbone_->forward(images.narrow(3, kFirstColumnPx, kColumnsPx), observe);
+  features.bio_token = bioclip_->forward(images, observe);
+  return features;
+}
+
+}  // namespace q3d::model

@@ -1,0 +1,40 @@
+// The network's modules under one roof, with the official checkpoint's parameter names. Starts in training mode,
+// like every torch module; Prima::load hands out a frozen one in evaluation mode.
+#pragma once
+
+#include <torch/torch.h>
+
+#include <memory>
+
+#include "model/bioclip.h"
+#include "model/config.h"
+#include "model/decoder.h"
+#include "model/layers.h"
+#include "model/prima.h"
+#include "model/vit.h"
+
+namespace q3d::model {
+
+class PrimaNet : public torch::nn::Module {
+ public:
+  // Weights are uninitialised; on torch::kMeta they have shapes only.
+  explicit PrimaNet(const PrimaConfig& config, const Placement& placement = {});
+
+  // images (B, 3, 256, 256) float32, normalised. Gradients flow if they are enabled.
+  ImageFeatures encode(const torch::Tensor& images, const Observer& observe = {}) const;
+
+  const PrimaConfig& config() const { return config_; }
+  const Placement& placement() const { return placement_; }
+  const Vit& backbone() const { return *backbone_; }
+  const BioClip& bioclip() const { return *bioclip_; }
+  const Decoder& decoder() const { return *decoder_; }
+
+ private:
+  PrimaConfig config_;
+  Placement placement_;
+  std::shared_ptr<Vit> backbone_;
+  std::shared_ptr<Decoder> decoder_;
+  std::shared_ptr<BioClip> bioclip_;
+};
+
+}  // namespace q3d::model

@@ -1,0 +1,227 @@
+#include "model/tta.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include "model/assemble.h"
+#include "model/net.h"
+#include "model/tta_slots.h"
+
+namespace q3d::model {
+namespace {
+
+// A batch of decoder outputs as rows, so that picking iterates is one copy.
+torch::Tensor pack(const DecoderOutput& output) {
+  return torch::cat({output.pose_6d, output.betas, output.camera, output.aux_keypoints_2d.flatten(1),
+                     output.aux_keypoints_3d.flatten(1)},
+                    1);
+}
+
+DecoderOutput unpack(const torch::Tensor& rows) {
+  const auto parts = rows.split_with_sizes({kPose6d, kBetas, kCamera, 2 * kKeypoints, 3 * kKeypoints}, 1);
+  return {parts[0], parts[1], parts[2], parts[3].unflatten(1, {kKeypoints, 2}),
+          parts[4].unflatten(1, {kKeypoints, 3})};
+}
+
+// |prediction - target| averaged over visible keypoints and both coordinates: (B).
+torch::Tensor mean_absolute_error(const torch::Tensor& prediction, const KeypointTargets& targets) {
+  const torch::Tensor error = (prediction - targets.xy).abs() * targets.visible;
+  return error.sum({1, 2}) / (2.0 * targets.count.clamp_min(1.0));
+}
+
+torch::Tensor objective(const TtaOptions& options, const torch::Tensor& projected, const torch::Tensor& aux,
+                        const KeypointTargets& targets) {
+  if (options.objective == TtaObjective::demo) {
+    const torch::Tensor error = (projected - targets.xy).square() * targets.visible;
+    return error.sum({1, 2}) / (targets.count + 1e-6);
+  }
+  return options.aux_weight * mean_absolute_error(aux, targets) +
+         options.reproj_weight * mean_absolute_error(projected, targets);
+}
+
+KeypointTargets make_targets(const torch::Tensor& keypoints, torch::Device device) {
+  const torch::Tensor numbers = keypoints.to(device).to(torch::kFloat32);
+  const torch::Tensor visible = numbers.narrow(2, 2, 1) > 0.0;
+  KeypointTargets targets;
+  targets.xy = torch::where(visible, numbers.narrow(2, 0, 2), torch::zeros({}, numbers.options()));
+  targets.visible = visible.to(torch::kFloat32);
+  targets.count = targets.visible.sum({1, 2});
+  return targets;
+}
+
+void require(bool holds, const std::string& message) {
+  if (!holds) throw std::invalid_argument("adapt: " + message);
+}
+
+void check_arguments(const Prima& prima, const ImageFeatures& features, const torch::Tensor& keypoints,
+                     const std::vector<TtaSchedule>& schedules, const TtaOptions& options) {
+  require_features(prima.net(), features);
+  require(!prima.net().is_training(), "the network is in training mode; call eval() first");
+  const std::int64_t batch = features.bio_token.size(0);
+  require(keypoints.dim() == 3 && keypoints.size(0) == batch && keypoints.size(1) == kKeypoints &&
+              keypoints.size(2) == 3,
+          fmt::format("keypoints: expected ({}, {}, 3), got {} dimensions, {} numbers", batch, kKeypoints,
+                      keypoints.dim(), keypoints.numel()));
+  require(static_cast<std::int64_t>(schedules.size()) == batch,
+          fmt::format("{} schedules for {} instances", schedules.size(), batch));
+  for (const TtaSchedule& schedule : schedules) {
+    require(schedule.iterations >= 0 && schedule.gain_window >= 1,
+            fmt::format("a schedule with {} iterations and a gain window of {}", schedule.iterations,
+                        schedule.gain_window));
+  }
+  require(std::isfinite(options.learning_rate) && options.learning_rate >= 0.0,
+          fmt::format("learning rate {}", options.learning_rate));
+}
+
+// (L0 - min over iterates 1..n) / L0.
+double relative_gain(const std::vector<double>& l_proj) {
+  const double least = *std::min_element(l_proj.begin() + 1, l_proj.end());
+  return l_proj.front() > 0.0 ? (l_proj.front() - least) / l_proj.front() : 0.0;
+}
+
+bool wants_to_stop(const TtaSchedule& schedule, const std::vector<double>& l_proj) {
+  const int taken = static_cast<int>(l_proj.size()) - 1;
+  if (taken >= schedule.iterations) return true;
+  if (schedule.stop_below > 0.0 && l_proj.back() < schedule.stop_below) return true;
+  return schedule.min_gain > 0.0 && taken == schedule.gain_window && relative_gain(l_proj) < schedule.min_gain;
+}
+
+// The active instances at one iterate.
+struct Iterate {
+  torch::Tensor rows;    // (n, 384) packed decoder outputs
+  torch::Tensor loss;    // (n), with its graph
+  torch::Tensor l_proj;  // (n)
+  torch::Tensor usable;  // (n) bool: all numbers finite and something visible to measure by
+};
+
+class Adaptation {
+ public:
+  Adaptation(const Prima& prima, const ImageFeatures& features, const torch::Tensor& keypoints,
+             const std::vector<TtaSchedule>& schedules, const TtaOptions& options)
+      : prima_(prima),
+        schedules_(schedules),
+        options_(options),
+        initial_betas_(decoder().initial_betas(features.bio_token)),
+        slots_(decoder().own_parameters(), decoder().remember(features.image_tokens), initial_betas_.clone(),
+               make_targets(keypoints, prima.device())) {
+    result_.l_proj.resize(schedules.size());
+    result_.loss.resize(schedules.size());
+    result_.best_iteration.resize(schedules.size(), 0);
+  }
+
+  TtaResult run() {
+    while (slots_.size() > 0) advance();
+    result_.best = assemble(prima_.net(), prima_.body(), unpack(best_), initial_betas_, false);
+    result_.last = assemble(prima_.net(), prima_.body(), unpack(last_), initial_betas_, false);
+    return std::move(result_);
+  }
+
+ private:
+  const Decoder& decoder() const { return prima_.net().decoder(); }
+
+  // Measures the present iterate, lets go of the instances that stop there and steps the others.
+  void advance() {
+    const bool may_step = any_step_left();
+    const auto leaves = slots_.parameters(may_step);
+    const Iterate iterate = evaluate(leaves, may_step);
+    const std::vector<bool> goes_on = record(iterate);
+    ++taken_;
+    if (std::find(goes_on.begin(), goes_on.end(), true) != goes_on.end()) {
+      // The gradient of the sum of losses: no operation mixes instances, so each one's stays its own.
+      slots_.step(torch::autograd::grad({iterate.loss}, leaves, {torch::ones_like(iterate.loss)}),
+                  options_.learning_rate);
+    }
+    for (std::int64_t slot = slots_.size() - 1; slot >= 0; --slot) {
+      if (!goes_on[static_cast<std::size_t>(slot)]) slots_.remove(slot);
+    }
+  }
+
+  bool any_step_left() const {
+    for (std::int64_t slot = 0; slot < slots_.size(); ++slot) {
+      if (schedules_[static_cast<std::size_t>(slots_.instance(slot))].iterations > taken_) return true;
+    }
+    return false;
+  }
+
+  Iterate evaluate(const std::vector<torch::Tensor>& parameters, bool with_gradient) const {
+    const torch::AutoGradMode mode(with_gradient);
+    const DecoderOutput output =
+        decoder().refine(slots_.memory(), slots_.initial_betas(), from_list(parameters));
+    const torch::Tensor projected =
+        projected_keypoints(prima_.body(), output, prima_.config().focal_px);
+    const KeypointTargets targets = slots_.targets();
+    Iterate iterate;
+    iterate.loss = objective(options_, projected, output.aux_keypoints_2d, targets);
+    const torch::NoGradGuard no_grad;
+    iterate.l_proj = mean_absolute_error(projected, targets);
+    iterate.rows = pack(output).detach();
+    iterate.usable = iterate.rows.isfinite().all(1) & projected.flatten(1).isfinite().all(1) &
+                     iterate.loss.isfinite() & iterate.l_proj.isfinite() & (targets.count > 0.0);
+    return iterate;
+  }
+
+  // Notes the iterate in the results -> per slot, whether the instance goes on.
+  std::vector<bool> record(const Iterate& iterate) {
+    const torch::Tensor numbers =
+        torch::stack({iterate.loss.detach(), iterate.l_proj, iterate.usable.to(torch::kFloat32)})
+            .to(torch::kCPU, torch::kFloat64);
+    const auto rows = numbers.accessor<double, 2>();
+    std::vector<std::int64_t> accepted, improved;
+    std::vector<bool> goes_on(static_cast<std::size_t>(slots_.size()), false);
+    for (std::int64_t slot = 0; slot < slots_.size(); ++slot) {
+      if (rows[2][slot] == 0.0) continue;
+      const auto instance = static_cast<std::size_t>(slots_.instance(slot));
+      std::vector<double>& l_proj = result_.l_proj[instance];
+      result_.loss[instance].push_back(rows[0][slot]);
+      accepted.push_back(slot);
+      if (l_proj.empty() || rows[1][slot] < l_proj[static_cast<std::size_t>(result_.best_iteration[instance])]) {
+        improved.push_back(slot);
+        result_.best_iteration[instance] = taken_;
+      }
+      l_proj.push_back(rows[1][slot]);
+      goes_on[static_cast<std::size_t>(slot)] = !wants_to_stop(schedules_[instance], l_proj);
+    }
+    if (taken_ == 0) {  // slots are still in the order of instances; unusable ones have nothing better
+      best_ = iterate.rows.clone();
+      last_ = iterate.rows.clone();
+    } else {
+      keep(last_, iterate.rows, accepted);
+      keep(best_, iterate.rows, improved);
+    }
+    return goes_on;
+  }
+
+  void keep(torch::Tensor& kept, const torch::Tensor& rows, const std::vector<std::int64_t>& slots) const {
+    if (slots.empty()) return;
+    std::vector<std::int64_t> instances;
+    for (const std::int64_t slot : slots) instances.push_back(slots_.instance(slot));
+    const auto index = [&](const std::vector<std::int64_t>& values) {
+      return torch::tensor(values, torch::kInt64).to(rows.device());
+    };
+    kept.index_copy_(0, index(instances), rows.index_select(0, index(slots)));
+  }
+
+  const Prima& prima_;
+  const std::vector<TtaSchedule>& schedules_;
+  const TtaOptions& options_;
+  torch::Tensor initial_betas_;  // (B, 41)
+  TtaSlots slots_;
+  torch::Tensor best_, last_;  // (B, 384) packed outputs
+  TtaResult result_;
+  int taken_ = 0;
+};
+
+}  // namespace
+
+TtaResult adapt(const Prima& prima, const ImageFeatures& features, const torch::Tensor& keypoints,
+                const std::vector<TtaSchedule>& schedules, const TtaOptions& options) {
+  check_arguments(prima, features, keypoints, schedules, options);
+  const torch::NoGradGuard no_grad;
+  return Adaptation(prima, features, keypoints, schedules, options).run();
+}
+
+}  // namespace q3d::model

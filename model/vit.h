@@ -1,0 +1,35 @@
+// The ViT image encoder. Paper section "Image Encoders"; official code: backbones/vit.py.
+#pragma once
+
+#include <torch/torch.h>
+
+#include <memory>
+#include <vector>
+
+#include "model/config.h"
+#include "model/layers.h"
+
+namespace q3d::model {
+
+inline constexpr std::int64_t kTokenRows = 16;
+inline constexpr std::int64_t kTokenColumns = 12;
+inline constexpr std::int64_t kImageTokens = kTokenRows * kTokenColumns;
+
+class VitBlock;
+
+class Vit : public torch::nn::Module {
+ public:
+  Vit(const PrimaConfig& config, const Placement& placement);
+
+  // images (B, 3, 256, 192) float32, normalised -> (B, 192, embed_dim) float32, row-major over 16 x 12 tokens.
+  torch::Tensor forward(const torch::Tensor& images, const Observer& observe = {}) const;
+
+ private:
+  std::shared_ptr<PatchConv> patch_;
+  torch::Tensor pos_embed_;  // (1, 193, embed_dim)
+  torch::Tensor cls_token_;  // (1, 1, embed_dim)
+  std::vector<std::shared_ptr<VitBlock>> blocks_;
+  std::shared_ptr<LayerNorm> last_norm_;
+};
+
+}  // namespace q3d::model

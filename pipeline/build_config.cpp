@@ -1,0 +1,233 @@
+#include "pipeline/build_config.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <regex>
+#include <set>
+
+#include "manifests/atomic_file.h"
+#include "pipeline/json_fields.h"
+
+namespace q3d::pipeline {
+namespace {
+
+using nlohmann::json;
+namespace fs = std::filesystem;
+
+void require(bool holds, const std::string& where, const std::string& what) {
+  if (!holds) throw ConfigError(where + ": " + what);
+}
+
+void require_one_of(const std::string& value, const std::vector<std::string>& known,
+                    const std::string& where) {
+  if (std::find(known.begin(), known.end(), value) != known.end()) return;
+  std::string list;
+  for (const auto& word : known) list += (list.empty() ? "" : ", ") + word;
+  throw ConfigError(fmt::format("{}: \"{}\" is not known; expected one of: {}. Did you mean \"{}\"?", where,
+                                value, list, nearest_word(value, known)));
+}
+
+loaders::DatasetOptions parse_dataset(const json& object, const std::string& where) {
+  loaders::DatasetOptions options;
+  std::string root;
+  std::string annotations;
+  std::string images;
+  JsonFields fields(object, where);
+  fields.require("name", options.name);
+  fields.require("format", options.format);
+  fields.require("root", root);
+  fields.require("annotations", annotations);
+  options.split = "train";
+  fields.read("split", options.split);
+  fields.read("images", images);
+  fields.finish();
+  require_one_of(options.format, loaders::dataset_formats(), where + ": format");
+  require(std::regex_match(options.name, std::regex("[A-Za-z0-9_.-]+")), where,
+          "\"name\" may hold letters, digits, '.', '_' and '-' only, got \"" + options.name + "\"");
+  options.root = root;
+  options.annotations = annotations;
+  options.images = images;
+  return options;
+}
+
+void parse_network(const json& object, const std::string& where, NetworkConfig& network) {
+  std::string checkpoint;
+  std::string asset;
+  JsonFields fields(object, where);
+  fields.require("checkpoint", checkpoint);
+  fields.require("smal_asset", asset);
+  fields.read("device", network.device);
+  fields.read("dtype", network.dtype);
+  fields.read("batch", network.batch);
+  fields.read("compute_threads", network.compute_threads);
+  fields.finish();
+  require_one_of(network.dtype, {"float32", "bfloat16"}, where + ": dtype");
+  require(network.batch >= 1, where, fmt::format("\"batch\" must be at least 1, got {}", network.batch));
+  require(network.compute_threads >= 0, where, "\"compute_threads\" must be 0 (all cores) or more");
+  network.checkpoint = checkpoint;
+  network.smal_asset = asset;
+}
+
+void parse_tta(const json& object, const std::string& where, TtaConfig& tta) {
+  JsonFields fields(object, where);
+  fields.read("objective", tta.objective);
+  fields.read("learning_rate", tta.learning_rate);
+  fields.read("aux_weight", tta.aux_weight);
+  fields.read("reproj_weight", tta.reproj_weight);
+  fields.read("iterations_min", tta.iterations_min);
+  fields.read("iterations_max", tta.iterations_max);
+  fields.read("batch", tta.batch);
+  fields.finish();
+  require_one_of(tta.objective, {"paper", "demo"}, where + ": objective");
+  require(tta.learning_rate > 0, where, "\"learning_rate\" must be greater than 0");
+  require(tta.iterations_min >= 1 && tta.iterations_min <= tta.iterations_max, where,
+          fmt::format("expected 1 <= iterations_min <= iterations_max, got {} and {}", tta.iterations_min,
+                      tta.iterations_max));
+  require(tta.batch >= 1, where, "\"batch\" must be at least 1");
+}
+
+void parse_filter(const json& object, const std::string& where, FilterConfig& filter) {
+  JsonFields fields(object, where);
+  fields.read("tau_low", filter.tau_low);
+  fields.read("tau_high", filter.tau_high);
+  fields.read("delta", filter.delta);
+  fields.finish();
+  require(
+      filter.tau_low.has_value() == filter.tau_high.has_value(), where,
+      "\"tau_low\" and \"tau_high\" belong together: give both, or neither and run `quadruped3d calibrate`");
+}
+
+void parse_shards(const json& object, const std::string& where, ShardConfig& shards) {
+  JsonFields fields(object, where);
+  fields.read("unit_size", shards.unit_size);
+  fields.read("images", shards.images);
+  fields.read("jpeg_quality", shards.jpeg_quality);
+  fields.read("crop_scale", shards.crop_scale);
+  fields.read("crop_min_side_px", shards.crop_min_side_px);
+  fields.finish();
+  require_one_of(shards.images, {"jpeg", "png", "reference"}, where + ": images");
+  require(shards.unit_size >= 1 && shards.unit_size <= 65536, where, "\"unit_size\" must be 1 to 65536");
+  require(shards.jpeg_quality >= 1 && shards.jpeg_quality <= 100, where, "\"jpeg_quality\" must be 1 to 100");
+  require(shards.crop_scale >= 1.0 && shards.crop_scale <= 4.0, where, "\"crop_scale\" must be 1 to 4");
+  require(shards.crop_min_side_px >= 256 && shards.crop_min_side_px <= 2048, where,
+          "\"crop_min_side_px\" must be 256 to 2048");
+}
+
+void parse_calibrate(const json& object, const std::string& where, filters::TargetShares& shares) {
+  JsonFields fields(object, where);
+  fields.read("retained", shares.retained);
+  fields.read("refined", shares.refined);
+  fields.finish();
+  require(shares.retained > 0 && shares.refined > 0 && shares.retained + shares.refined < 1, where,
+          "the shares must be greater than 0 and their sum less than 1");
+}
+
+// Turns the paths of one file into absolute ones, so that files in different folders can be laid over each
+// other.
+void resolve_paths(json& config, const fs::path& folder) {
+  const auto resolve = [&](json& object, const char* key) {
+    if (object.is_object() && object.contains(key) && object[key].is_string()) {
+      object[key] = (folder / object[key].get<std::string>()).lexically_normal().string();
+    }
+  };
+  if (config.contains("network")) {
+    resolve(config["network"], "checkpoint");
+    resolve(config["network"], "smal_asset");
+  }
+  if (config.contains("datasets") && config["datasets"].is_array()) {
+    for (auto& dataset : config["datasets"]) resolve(dataset, "root");
+  }
+}
+
+json read_json(const fs::path& file) {
+  try {
+    return json::parse(manifests::read_file(file), nullptr, true, /*ignore_comments=*/true);
+  } catch (const json::parse_error& error) {
+    throw ConfigError(fmt::format("{}: not valid JSON: {}", file.string(), error.what()));
+  } catch (const std::runtime_error& error) {
+    throw ConfigError(error.what());
+  }
+}
+
+}  // namespace
+
+BuildConfig parse_build_config(const json& merged, const std::string& where) {
+  BuildConfig config;
+  JsonFields fields(merged, where);
+  fields.read("name", config.name);
+  fields.read("version", config.version);
+  if (const json* datasets = fields.child("datasets")) {
+    require(datasets->is_array(), where, "\"datasets\" must be a list of objects");
+    for (std::size_t i = 0; i < datasets->size(); ++i) {
+      config.datasets.push_back(parse_dataset((*datasets)[i], fmt::format("{}: datasets[{}]", where, i)));
+    }
+  }
+  require(!config.datasets.empty(), where, "\"datasets\" must name at least one dataset");
+  if (const json* network = fields.child("network")) {
+    parse_network(*network, where + ": network", config.network);
+  } else {
+    throw ConfigError(where + ": the key \"network\" is missing");
+  }
+  if (const json* tta = fields.child("tta")) parse_tta(*tta, where + ": tta", config.tta);
+  if (const json* filter = fields.child("filter")) parse_filter(*filter, where + ": filter", config.filter);
+  if (const json* shards = fields.child("shards")) parse_shards(*shards, where + ": shards", config.shards);
+  if (const json* shares = fields.child("calibrate")) {
+    parse_calibrate(*shares, where + ": calibrate", config.calibrate);
+  }
+  fields.finish();
+  require(std::regex_match(config.name, std::regex("[A-Za-z0-9_.-]+")), where,
+          "\"name\" becomes a folder's name: letters, digits, '.', '_' and '-' only");
+  require(std::regex_match(config.version, std::regex("[0-9]+\\.[0-9]+\\.[0-9]+")), where,
+          "\"version\" must look like 1.0.0, got \"" + config.version + "\"");
+  std::set<std::string> seen;
+  for (const auto& dataset : config.datasets) {
+    require(seen.insert(dataset.name + "/" + dataset.split).second, where,
+            "two datasets have the name and split " + dataset.name + "/" + dataset.split +
+                "; sample ids would not be unique");
+  }
+  config.as_written = merged;
+  return config;
+}
+
+BuildConfig load_build_config(const std::vector<fs::path>& files) {
+  json as_written = json::object();
+  json resolved = json::object();
+  std::string where;
+  for (const auto& file : files) {
+    json layer = read_json(file);
+    require(layer.is_object(), file.string(), "expected a JSON object at the top level");
+    as_written.merge_patch(layer);
+    resolve_paths(layer, fs::absolute(file).parent_path());
+    resolved.merge_patch(layer);
+    where += (where.empty() ? "" : " + ") + file.string();
+  }
+  BuildConfig config = parse_build_config(resolved, where);
+  config.as_written = std::move(as_written);
+  return config;
+}
+
+filters::Thresholds thresholds(const BuildConfig& config) {
+  if (!config.filter.tau_low || !config.filter.tau_high) {
+    throw ConfigError(
+        "the config has no \"filter\": {\"tau_low\", \"tau_high\"}: the thresholds depend on the pool and "
+        "the "
+        "network, so there is no default. Run `quadruped3d calibrate` with the same config; it prints them "
+        "and "
+        "writes a file that `build --config` takes as a second layer");
+  }
+  filters::Thresholds result;
+  result.tau_low = *config.filter.tau_low;
+  result.tau_high = *config.filter.tau_high;
+  result.delta = config.filter.delta;
+  result.iterations_min = config.tta.iterations_min;
+  result.iterations_max = config.tta.iterations_max;
+  try {
+    filters::check(result);
+  } catch (const std::invalid_argument& error) {
+    throw ConfigError(std::string("filter: ") + error.what());
+  }
+  return result;
+}
+
+}  // namespace q3d::pipeline

@@ -1,0 +1,74 @@
+// The configuration of a build: one JSON file, or several laid over each other. docs/config.md explains every
+// key.
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "filters/calibrate.h"
+#include "filters/fidelity.h"
+#include "loaders/dataset.h"
+
+namespace q3d::pipeline {
+
+struct NetworkConfig {
+  std::filesystem::path checkpoint;  // safetensors, official parameter names
+  std::filesystem::path smal_asset;  // safetensors; see smal/asset.h
+  std::string device = "auto";       // auto, cpu, cuda, cuda:I
+  std::string dtype = "float32";     // float32, bfloat16
+  int batch = 8;                     // crops in one forward pass; batches never cross a unit
+  int compute_threads = 0;           // threads of one CPU operator; 0 = all cores. Part of the results' key.
+};
+
+struct TtaConfig {
+  std::string objective = "paper";  // paper, demo
+  double learning_rate = 1e-6;
+  double aux_weight = 5.0;
+  double reproj_weight = 0.5;
+  int iterations_min = 10;
+  int iterations_max = 60;
+  int batch = 8;
+};
+
+struct FilterConfig {
+  std::optional<double> tau_low;  // crop units; absent until calibrated
+  std::optional<double> tau_high;
+  double delta = 0.05;
+};
+
+struct ShardConfig {
+  int unit_size = 512;          // candidates of one work unit = one shard
+  std::string images = "jpeg";  // jpeg, png or reference (no pictures in the shards)
+  int jpeg_quality = 95;
+  double crop_scale = 1.9;  // the stored crop's side over the box's longer side
+  int crop_min_side_px = 480;
+};
+
+struct BuildConfig {
+  std::string name = "quadruped3d";
+  std::string version = "1.0.0";  // semantic version of the dataset, the user's own
+  std::vector<loaders::DatasetOptions> datasets;
+  NetworkConfig network;
+  TtaConfig tta;
+  FilterConfig filter;
+  ShardConfig shards;
+  filters::TargetShares calibrate;
+  nlohmann::json as_written;  // the merged JSON, paths as the user wrote them
+};
+
+// Reads the files in order; a later file's keys replace an earlier one's. Relative paths are relative to the
+// file that names them. Throws ConfigError naming file, key, got and expected.
+BuildConfig load_build_config(const std::vector<std::filesystem::path>& files);
+
+// Checks and converts merged JSON; `where` names it in messages.
+BuildConfig parse_build_config(const nlohmann::json& json, const std::string& where);
+
+// The thresholds of a calibrated config. Throws ConfigError naming `calibrate` when they are absent.
+filters::Thresholds thresholds(const BuildConfig& config);
+
+}  // namespace q3d::pipeline

@@ -1,0 +1,92 @@
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include <cstdio>
+#include <memory>
+
+#include "manifests/atomic_file.h"
+#include "pipeline/build.h"
+#include "pipeline/cli/commands.h"
+#include "pipeline/progress.h"
+
+namespace q3d::pipeline::cli {
+namespace {
+
+struct Arguments {
+  std::vector<std::filesystem::path> configs;
+  RunOptions run;
+  bool json = false;
+};
+
+double percent(std::int64_t part, std::int64_t whole) {
+  return whole == 0 ? 0.0 : 100.0 * static_cast<double>(part) / static_cast<double>(whole);
+}
+
+void print_summary(const BuildSummary& summary) {
+  const Counts& counts = summary.dataset.counts;
+  const auto line = [&](const char* name, std::int64_t count) {
+    fmt::print(stderr, "  {:<10} {:>8}  {:5.1f} %\n", name, count, percent(count, counts.candidates));
+  };
+  fmt::print(stderr, "\n{} {} in {}\n", summary.dataset.name,
+             summary.was_up_to_date ? "was up to date" : "built", human_duration(summary.seconds));
+  fmt::print(stderr, "  {:<10} {:>8}\n", "candidates", counts.candidates);
+  line("retained", counts.retained);
+  line("refined", counts.refined);
+  line("discarded", counts.discarded);
+  line("failed", counts.failed);
+  for (const auto& [reason, count] : summary.dataset.reasons)
+    fmt::print(stderr, "    {:<22} {}\n", reason, count);
+  fmt::print(stderr, "  {} shards in {}\n", summary.dataset.shards.size(), summary.folder.string());
+  fmt::print(stderr, "  every verdict: {}\n", (summary.folder / "verdicts.csv").string());
+  fmt::print(stderr, "next: quadruped3d verify {0}\n      quadruped3d inspect {0} --sheet sheet.png\n",
+             summary.folder.string());
+}
+
+nlohmann::ordered_json to_json(const BuildSummary& summary) {
+  const Counts& counts = summary.dataset.counts;
+  return {{"candidates", counts.candidates},
+          {"retained", counts.retained},
+          {"refined", counts.refined},
+          {"discarded", counts.discarded},
+          {"failed", counts.failed},
+          {"shards", summary.dataset.shards.size()},
+          {"dataset", summary.folder.string()},
+          {"content_id", summary.dataset.content_id},
+          {"reasons", summary.dataset.reasons},
+          {"up_to_date", summary.was_up_to_date},
+          {"seconds", summary.seconds}};
+}
+
+}  // namespace
+
+Command add_build(CLI::App& app) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command =
+      app.add_subcommand("build", "annotated photographs in, a versioned dataset of labels out");
+  command->add_option("-c,--config", arguments->configs, "JSON config; a second one is laid over the first")
+      ->required()
+      ->check(CLI::ExistingFile);
+  command->add_option("-o,--out", arguments->run.out, "output folder; OUT/latest is the newest dataset")
+      ->required();
+  command->add_option("-t,--threads", arguments->run.threads, "threads that read and decode (0 = all cores)")
+      ->check(CLI::NonNegativeNumber);
+  command->add_flag("--json", arguments->json, "print a machine-readable summary on stdout");
+  command->add_flag("-q,--quiet", arguments->run.quiet, "no progress");
+  command->footer(
+      "Examples:\n"
+      "  quadruped3d build --config configs/sample.json --config out/thresholds.json --out out\n"
+      "  quadruped3d build -c my.json -o out --json > summary.json\n"
+      "A build that was killed goes on where it left off when the same command is run again, and ends with "
+      "the same\n"
+      "bytes. Bad pictures and records never stop it: they are counted, with reasons, in verdicts.csv.\n"
+      "Without thresholds in the config it stops and names `quadruped3d calibrate`.");
+  return [arguments] {
+    const BuildSummary summary = build(load_build_config(arguments->configs), arguments->run);
+    print_summary(summary);
+    if (arguments->json) fmt::print("{}\n", to_json(summary).dump());
+    return 0;
+  };
+}
+
+}  // namespace q3d::pipeline::cli

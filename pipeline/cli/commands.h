@@ -1,0 +1,23 @@
+// The subcommands of `quadruped3d`. Each add_* declares one on the application and returns what runs it.
+#pragma once
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+
+#include <functional>
+
+namespace q3d::pipeline::cli {
+
+// A command that was chosen: runs it and returns the exit code. Throws ConfigError, Interrupted,
+// std::exception.
+using Command = std::function<int()>;
+
+Command add_build(CLI::App& app);
+Command add_calibrate(CLI::App& app);
+Command add_verify(CLI::App& app);
+Command add_inspect(CLI::App& app);
+Command add_init(CLI::App& app);
+Command add_sample(CLI::App& app);
+
+}  // namespace q3d::pipeline::cli

@@ -1,0 +1,65 @@
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include <cstdio>
+#include <memory>
+
+#include "pipeline/cli/commands.h"
+#include "pipeline/errors.h"
+#include "pipeline/network.h"
+
+namespace q3d::pipeline::cli {
+namespace {
+
+struct Arguments {
+  std::filesystem::path out;
+  std::filesystem::path asset;
+  std::string size = "small";
+  std::uint64_t seed = 0;
+  bool json = false;
+};
+
+}  // namespace
+
+Command add_init(CLI::App& app) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command =
+      app.add_subcommand("init", "a seeded, untrained checkpoint and the synthetic SMAL asset");
+  command->add_option("-o,--out", arguments->out, "checkpoint to write (safetensors)");
+  command->add_option("-s,--size", arguments->size, "vith (the paper's), small or tiny")
+      ->capture_default_str();
+  command->add_option("--seed", arguments->seed, "the same seed gives the same bytes")->capture_default_str();
+  command->add_option("--smal-asset", arguments->asset,
+                      "also write the synthetic quadruped with SMAL's dimensions");
+  command->add_flag("--json", arguments->json, "print a machine-readable summary on stdout");
+  command->footer(
+      "Examples:\n"
+      "  quadruped3d init --size small --out data/small.safetensors --smal-asset "
+      "data/smal_synthetic.safetensors\n"
+      "  quadruped3d init --size vith --seed 7 --out data/vith.safetensors\n"
+      "An untrained network predicts nothing useful: it is there to try the machinery at any size. SMAL "
+      "itself cannot\n"
+      "be redistributed; the synthetic quadruped has its dimensions.");
+  return [arguments] {
+    if (arguments->out.empty() && arguments->asset.empty()) {
+      throw ConfigError("init: give --out for a checkpoint, --smal-asset for the body, or both");
+    }
+    nlohmann::ordered_json document = nlohmann::ordered_json::object();
+    if (!arguments->out.empty()) {
+      write_initial_checkpoint(arguments->out, arguments->size, arguments->seed);
+      fmt::print(stderr, "wrote {} ({}, seed {})\n", arguments->out.string(), arguments->size,
+                 arguments->seed);
+      document["checkpoint"] = arguments->out.string();
+    }
+    if (!arguments->asset.empty()) {
+      write_synthetic_asset(arguments->asset);
+      fmt::print(stderr, "wrote {}\n", arguments->asset.string());
+      document["smal_asset"] = arguments->asset.string();
+    }
+    if (arguments->json) fmt::print("{}\n", document.dump());
+    return 0;
+  };
+}
+
+}  // namespace q3d::pipeline::cli

@@ -1,0 +1,75 @@
+// quadruped3d: the one program. Parses the command line, runs one subcommand, turns exceptions into exit
+// codes.
+
+#include <fmt/format.h>
+
+#include <opencv2/core.hpp>
+
+#include <cstdio>
+#include <new>
+#include <utility>
+#include <vector>
+
+#include "pipeline/cli/commands.h"
+#include "pipeline/errors.h"
+#include "pipeline/interrupt.h"
+
+namespace {
+
+constexpr int kFailure = 1;
+constexpr int kUsage = 2;
+constexpr int kInterrupted = 130;
+
+int run(int argc, char** argv) {
+  namespace cli = q3d::pipeline::cli;
+  CLI::App app{
+      "Builds Quadruped3D datasets: pseudo-3D labels (SMAL pose, shape, camera) for 2D-annotated photographs "
+      "of quadrupeds,\nwith a verdict and a provenance for every one of them."};
+  app.name("quadruped3d");
+  app.require_subcommand(1);
+  app.set_version_flag("--version", "quadruped3d 0.1.0");
+  app.footer(
+      "First steps:\n"
+      "  quadruped3d sample --out data/world                 make pictures to try it on\n"
+      "  quadruped3d init --size small --out data/small.safetensors\n"
+      "  quadruped3d calibrate --config configs/sample.json --out out --write out/thresholds.json\n"
+      "  quadruped3d build --config configs/sample.json --config out/thresholds.json --out out\n"
+      "  quadruped3d verify out\n"
+      "`quadruped3d COMMAND --help` explains a command by example.");
+  const std::vector<std::pair<std::string, cli::Command>> commands = {
+      {"build", cli::add_build(app)},   {"calibrate", cli::add_calibrate(app)},
+      {"verify", cli::add_verify(app)}, {"inspect", cli::add_inspect(app)},
+      {"sample", cli::add_sample(app)}, {"init", cli::add_init(app)},
+  };
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : kUsage;
+  }
+  for (const auto& [name, command] : commands) {
+    if (app.got_subcommand(name)) return command();
+  }
+  return kUsage;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  cv::setNumThreads(1);  // the flow graph's threads are the only ones
+  q3d::pipeline::install_interrupt_handlers();
+  try {
+    return run(argc, argv);
+  } catch (const q3d::pipeline::Interrupted&) {
+    fmt::print(stderr, "stopped; run the same command to go on where it left off\n");
+    return kInterrupted;
+  } catch (const q3d::pipeline::ConfigError& error) {
+    fmt::print(stderr, "quadruped3d: {}\n", error.what());
+    return kUsage;
+  } catch (const std::bad_alloc&) {
+    fmt::print(stderr, "quadruped3d: out of memory; lower network.batch, tta.batch or shards.unit_size\n");
+    return kFailure;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "quadruped3d: {}\n", error.what());
+    return kFailure;
+  }
+}

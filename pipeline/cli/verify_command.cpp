@@ -1,0 +1,53 @@
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include <cstdio>
+#include <memory>
+
+#include "pipeline/cli/commands.h"
+#include "pipeline/verify.h"
+
+namespace q3d::pipeline::cli {
+namespace {
+
+struct Arguments {
+  std::filesystem::path dataset;
+  bool json = false;
+  bool quiet = false;
+};
+
+}  // namespace
+
+Command add_verify(CLI::App& app) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = app.add_subcommand("verify", "read a dataset whole and check every byte of it");
+  command->add_option("dataset", arguments->dataset, "a dataset's folder, or an output folder (its latest)")
+      ->required()
+      ->check(CLI::ExistingDirectory);
+  command->add_flag("--json", arguments->json, "print a machine-readable summary on stdout");
+  command->add_flag("-q,--quiet", arguments->quiet, "no progress");
+  command->footer(
+      "Examples:\n"
+      "  quadruped3d verify out\n"
+      "  quadruped3d verify out/quadruped3d-0123456789ab --json\n"
+      "Exit code 0: sound. 1: something is wrong; every problem is listed.");
+  return [arguments] {
+    const VerifySummary summary = verify(arguments->dataset, arguments->quiet);
+    for (const std::string& problem : summary.problems) fmt::print(stderr, "problem: {}\n", problem);
+    const bool sound = summary.problems.empty();
+    fmt::print(stderr, "{}: {} shards, {} samples, {} pictures read: {}\n", summary.folder.string(),
+               summary.shards, summary.samples, summary.pictures,
+               sound ? "sound" : fmt::format("{} problems", summary.problems.size()));
+    if (arguments->json) {
+      const nlohmann::ordered_json document = {
+          {"dataset", summary.folder.string()}, {"sound", sound},
+          {"shards", summary.shards},           {"samples", summary.samples},
+          {"pictures", summary.pictures},       {"problems", summary.problems}};
+      fmt::print("{}\n", document.dump());
+    }
+    return sound ? 0 : 1;
+  };
+}
+
+}  // namespace q3d::pipeline::cli

@@ -1,0 +1,245 @@
+#include "pipeline/dataset_manifest.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include <cmath>
+#include <stdexcept>
+
+#include "manifests/atomic_file.h"
+#include "manifests/shard.h"
+
+namespace q3d::pipeline {
+namespace {
+
+using manifests::Verdict;
+using nlohmann::json;
+using nlohmann::ordered_json;
+
+constexpr const char* kToolkitVersion = "0.1.0";
+
+ordered_json to_json(const Counts& counts) {
+  return {{"candidates", counts.candidates},
+          {"retained", counts.retained},
+          {"refined", counts.refined},
+          {"discarded", counts.discarded},
+          {"failed", counts.failed}};
+}
+
+// Counts and mean errors by any label of the candidates.
+class Statistics {
+ public:
+  void add(const std::string& label, const manifests::Judgement& judgement) {
+    Group& group = groups_[label.empty() ? "unknown" : label];
+    group.counts.add(judgement.verdict);
+    if (judgement.verdict == Verdict::retained || judgement.verdict == Verdict::refined) {
+      group.initial += judgement.initial_error;
+      group.final += judgement.final_error;
+    }
+  }
+  ordered_json to_json() const {
+    ordered_json object = ordered_json::object();
+    for (const auto& [label, group] : groups_) {
+      ordered_json entry = pipeline::to_json(group.counts);
+      const auto kept = static_cast<double>(group.counts.retained + group.counts.refined);
+      if (kept > 0) {
+        entry["mean_initial_error_of_kept"] = group.initial / kept;
+        entry["mean_final_error_of_kept"] = group.final / kept;
+      }
+      object[label] = std::move(entry);
+    }
+    return object;
+  }
+
+ private:
+  struct Group {
+    Counts counts;
+    double initial = 0.0;
+    double final = 0.0;
+  };
+  std::map<std::string, Group> groups_;
+};
+
+ordered_json statistics(const Ingest& ingest, const std::vector<manifests::Judgement>& judgements) {
+  Statistics all;
+  Statistics by_dataset;
+  Statistics by_family;
+  Statistics by_species;
+  std::map<std::string, std::int64_t> reasons;
+  for (std::size_t i = 0; i < judgements.size(); ++i) {
+    const manifests::SampleRecord& record = ingest.candidates[i].record;
+    all.add("all", judgements[i]);
+    by_dataset.add(record.dataset + "/" + record.split, judgements[i]);
+    by_family.add(std::string(manifests::to_string(record.family)), judgements[i]);
+    by_species.add(record.species, judgements[i]);
+    if (judgements[i].reason != manifests::Reason::none) {
+      ++reasons[std::string(manifests::to_string(judgements[i].reason))];
+    }
+  }
+  ordered_json object = all.to_json();
+  object["reasons"] = reasons;
+  object["by_dataset"] = by_dataset.to_json();
+  object["by_family"] = by_family.to_json();
+  object["by_species"] = by_species.to_json();
+  return object;
+}
+
+// Shortest text that reads back as the same number; empty for NaN.
+std::string number(double value) {
+  return std::isnan(value) ? std::string() : fmt::format("{}", value);
+}
+
+std::string csv_field(const std::string& text) {
+  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + '"';
+}
+
+}  // namespace
+
+void Counts::add(Verdict verdict) {
+  ++candidates;
+  switch (verdict) {
+    case Verdict::retained:
+      ++retained;
+      break;
+    case Verdict::refined:
+      ++refined;
+      break;
+    case Verdict::discarded:
+      ++discarded;
+      break;
+    case Verdict::failed:
+      ++failed;
+      break;
+  }
+}
+
+std::string content_id(const std::vector<ShardEntry>& shards) {
+  std::string text;
+  for (const ShardEntry& shard : shards) text += shard.sha256 + '\n';
+  return manifests::sha256(text);
+}
+
+std::string dataset_json(const DatasetInputs& inputs, const std::vector<manifests::Judgement>& judgements,
+                         const std::vector<ShardEntry>& shards, const std::string& verdicts_sha256) {
+  Counts counts;
+  for (const auto& judgement : judgements) counts.add(judgement.verdict);
+  ordered_json shard_list = ordered_json::array();
+  for (const ShardEntry& shard : shards) {
+    shard_list.push_back({{"file", shard.file},
+                          {"unit", shard.unit},
+                          {"rows", shard.rows},
+                          {"bytes", shard.bytes},
+                          {"sha256", shard.sha256}});
+  }
+  const StageKeys& keys = *inputs.keys;
+  const ordered_json document = {{"format", kDatasetFormat},
+                                 {"schema", manifests::kShardSchema},
+                                 {"name", inputs.config->name},
+                                 {"version", inputs.config->version},
+                                 {"key", keys.dataset},
+                                 {"content_id", content_id(shards)},
+                                 {"toolkit", kToolkitVersion},
+                                 {"counts", to_json(counts)},
+                                 {"thresholds",
+                                  {{"tau_low", inputs.thresholds->tau_low},
+                                   {"tau_high", inputs.thresholds->tau_high},
+                                   {"delta", inputs.thresholds->delta}}},
+                                 {"statistics", statistics(*inputs.ingest, judgements)},
+                                 {"provenance",
+                                  {{"config", inputs.config->as_written},
+                                   {"annotations", inputs.ingest->annotation_digests},
+                                   {"checkpoint_sha256", inputs.assets->checkpoint},
+                                   {"smal_asset_sha256", inputs.assets->smal_asset},
+                                   {"device", inputs.device_key},
+                                   {"stage_keys",
+                                    {{"ingest", keys.ingest},
+                                     {"predict", keys.predict},
+                                     {"fidelity", keys.fidelity},
+                                     {"refine", keys.refine},
+                                     {"shards", keys.shards}}}}},
+                                 {"verdicts", {{"file", "verdicts.csv"}, {"sha256", verdicts_sha256}}},
+                                 {"shards", shard_list}};
+  return document.dump(2) + "\n";
+}
+
+std::string verdicts_csv(const Ingest& ingest, const std::vector<manifests::Judgement>& judgements) {
+  std::string text =
+      "id,verdict,reason,initial_error,final_error,gain,iterations,best_iteration,dataset,split,source,"
+      "species,family,"
+      "shard,row,image_sha256,detail\n";
+  for (const Unit& unit : ingest.units) {
+    std::int64_t row = 0;
+    for (std::size_t i = unit.first; i < unit.first + unit.count; ++i) {
+      const manifests::SampleRecord& record = ingest.candidates[i].record;
+      const manifests::Judgement& judgement = judgements[i];
+      const bool kept = judgement.verdict == Verdict::retained || judgement.verdict == Verdict::refined;
+      const bool judged = !std::isnan(judgement.initial_error);
+      text += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", csv_field(record.id),
+                          manifests::to_string(judgement.verdict), manifests::to_string(judgement.reason),
+                          number(judgement.initial_error), number(judgement.final_error),
+                          number(judgement.gain), judged ? std::to_string(judgement.iterations) : "",
+                          judged ? std::to_string(judgement.best_iteration) : "", csv_field(record.dataset),
+                          csv_field(record.split), csv_field(record.source), csv_field(record.species),
+                          manifests::to_string(record.family), kept ? std::to_string(unit.index) : "",
+                          kept ? std::to_string(row) : "", ingest.candidates[i].image_sha256,
+                          csv_field(judgement.detail));
+      if (kept) ++row;
+    }
+  }
+  return text;
+}
+
+std::filesystem::path dataset_folder(const std::filesystem::path& given) {
+  for (const auto& folder : {given, given / "latest"}) {
+    if (std::filesystem::exists(folder / "dataset.json")) return folder;
+  }
+  throw std::runtime_error(
+      fmt::format("{}: expected a dataset folder (with dataset.json) or an output folder of "
+                  "`build` (with latest/dataset.json)",
+                  given.string()));
+}
+
+DatasetManifest read_dataset_manifest(const std::filesystem::path& given) {
+  const std::filesystem::path file = dataset_folder(given) / "dataset.json";
+  try {
+    const json document = json::parse(manifests::read_file(file));
+    if (document.at("format") != kDatasetFormat) {
+      throw std::runtime_error(
+          fmt::format("format is {}, expected {}", document.at("format").dump(), kDatasetFormat));
+    }
+    DatasetManifest manifest;
+    manifest.schema = document.at("schema").get<int>();
+    if (manifest.schema != manifests::kShardSchema) {
+      throw std::runtime_error(
+          fmt::format("schema is {}, this toolkit reads {}; use the toolkit version that wrote it "
+                      "({})",
+                      manifest.schema, manifests::kShardSchema, document.value("toolkit", "?")));
+    }
+    manifest.name = document.at("name").get<std::string>();
+    manifest.version = document.at("version").get<std::string>();
+    manifest.key = document.at("key").get<std::string>();
+    manifest.content_id = document.at("content_id").get<std::string>();
+    const json& counts = document.at("counts");
+    manifest.counts = {counts.at("candidates").get<std::int64_t>(), counts.at("retained").get<std::int64_t>(),
+                       counts.at("refined").get<std::int64_t>(), counts.at("discarded").get<std::int64_t>(),
+                       counts.at("failed").get<std::int64_t>()};
+    manifest.verdicts_sha256 = document.at("verdicts").at("sha256").get<std::string>();
+    manifest.reasons = document.at("statistics").at("reasons").get<std::map<std::string, std::int64_t>>();
+    for (const json& shard : document.at("shards")) {
+      manifest.shards.push_back({shard.at("file").get<std::string>(), shard.at("sha256").get<std::string>(),
+                                 shard.at("bytes").get<std::int64_t>(), shard.at("rows").get<std::int64_t>(),
+                                 shard.at("unit").get<std::int64_t>()});
+    }
+    return manifest;
+  } catch (const json::exception& error) {
+    throw std::runtime_error(fmt::format("{}: not a readable dataset.json: {}", file.string(), error.what()));
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(fmt::format("{}: {}", file.string(), error.what()));
+  }
+}
+
+}  // namespace q3d::pipeline

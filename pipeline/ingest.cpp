@@ -1,0 +1,92 @@
+#include "pipeline/ingest.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <set>
+#include <stdexcept>
+
+#include "manifests/record_json.h"
+#include "pipeline/errors.h"
+#include "pipeline/interrupt.h"
+
+namespace q3d::pipeline {
+namespace {
+
+using manifests::Reason;
+
+std::filesystem::path annotation_path(const loaders::DatasetOptions& options) {
+  return options.annotations.is_absolute() ? options.annotations : options.root / options.annotations;
+}
+
+void require_unique_ids(const std::vector<Candidate>& candidates) {
+  std::set<std::string_view> seen;
+  for (const Candidate& candidate : candidates) {
+    if (!seen.insert(candidate.record.id).second) {
+      throw std::runtime_error(fmt::format("the sample id {} occurs twice; ids must be unique within a build",
+                                           candidate.record.id));
+    }
+  }
+}
+
+loaders::Dataset load(const loaders::DatasetOptions& options) {
+  try {
+    return loaders::load_dataset(options);
+  } catch (const std::invalid_argument& error) {
+    throw ConfigError(fmt::format("dataset {}: {}", options.name, error.what()));
+  }
+}
+
+// A picture that cannot be read now is a failed sample, never a failed build.
+void digest_pictures(std::vector<Candidate>& candidates, manifests::DigestCache& digests) {
+  tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t i) {
+    Candidate& candidate = candidates[i];
+    if (candidate.record.failure != Reason::none || interrupted()) return;
+    try {
+      candidate.image_sha256 = digests.digest(candidate.record.image_path);
+    } catch (const std::runtime_error& error) {
+      candidate.record.failure = Reason::image_missing;
+      candidate.record.failure_detail = error.what();
+    }
+  });
+  throw_if_interrupted();
+}
+
+std::vector<Unit> cut_units(const std::vector<Candidate>& candidates, std::size_t unit_size) {
+  std::vector<Unit> units;
+  for (std::size_t first = 0; first < candidates.size(); first += unit_size) {
+    Unit unit;
+    unit.index = static_cast<std::int64_t>(units.size());
+    unit.first = first;
+    unit.count = std::min(unit_size, candidates.size() - first);
+    std::string text;
+    for (std::size_t i = first; i < first + unit.count; ++i) {
+      text += manifests::record_digest(candidates[i].record) + ' ' + candidates[i].image_sha256 + '\n';
+    }
+    unit.input_digest = manifests::sha256(text);
+    units.push_back(std::move(unit));
+  }
+  return units;
+}
+
+}  // namespace
+
+Ingest ingest(const BuildConfig& config, manifests::DigestCache& digests) {
+  Ingest result;
+  for (const auto& options : config.datasets) {
+    throw_if_interrupted();
+    loaders::Dataset dataset = load(options);
+    const std::string name = options.name + "/" + options.split;
+    result.annotation_digests[name] = digests.digest(annotation_path(options));
+    for (auto& record : dataset.records) result.candidates.push_back({std::move(record), {}});
+    for (const auto& note : dataset.notes) result.notes.push_back(name + ": " + note);
+  }
+  require_unique_ids(result.candidates);
+  digest_pictures(result.candidates, digests);
+  digests.save();
+  result.units = cut_units(result.candidates, static_cast<std::size_t>(config.shards.unit_size));
+  return result;
+}
+
+}  // namespace q3d::pipeline

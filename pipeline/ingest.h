@@ -1,0 +1,40 @@
+// Ingest: annotation files -> the ordered list of candidates, each with the digest of its picture.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "manifests/digest.h"
+#include "manifests/sample.h"
+#include "pipeline/build_config.h"
+
+namespace q3d::pipeline {
+
+struct Candidate {
+  manifests::SampleRecord record;
+  std::string image_sha256;  // empty when the picture could not be read
+};
+
+// A fixed run of candidates in ingest order: the grain of resume and of determinism. It becomes one shard.
+struct Unit {
+  std::int64_t index = 0;
+  std::size_t first = 0;  // into Ingest::candidates
+  std::size_t count = 0;
+  std::string input_digest;  // over the records and pictures of the unit
+};
+
+struct Ingest {
+  std::vector<Candidate> candidates;  // dataset order of the config, then file order
+  std::vector<Unit> units;
+  std::map<std::string, std::string> annotation_digests;  // "name/split" -> SHA-256 of its annotation file
+  std::vector<std::string> notes;                         // what the loaders want a person to know
+};
+
+// Loads every dataset and digests every picture (in parallel; unchanged files come from the cache). Throws
+// std::runtime_error for an annotation file that cannot be read, Interrupted.
+Ingest ingest(const BuildConfig& config, manifests::DigestCache& digests);
+
+}  // namespace q3d::pipeline

@@ -1,0 +1,82 @@
+// The network as the pipeline sees it: plain pictures and keypoints in, plain numbers out. Keeps LibTorch out
+// of every other file of this folder.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "manifests/sample.h"
+#include "pipeline/build_config.h"
+
+namespace q3d::pipeline {
+
+// One body as the network sees it. Rotations are row-major 3x3 matrices, joint 0 is the global orientation;
+// keypoints_2d are in crop units, everything in 3D in the crop camera's frame and SMAL units.
+struct BodyPrediction {
+  std::array<float, manifests::kNumJoints * 9> rotations{};
+  std::array<float, manifests::kNumBetas> betas{};
+  std::array<float, 3> camera{};
+  std::array<float, 3> translation{};
+  std::array<float, manifests::kNumKeypoints * 3> keypoints_3d{};
+  std::array<float, manifests::kNumKeypoints * 2> keypoints_2d{};
+  std::array<float, manifests::kNumKeypoints * 2> aux_keypoints_2d{};
+};
+bool is_finite(const BodyPrediction& body);
+
+using CropKeypoints = std::array<float, manifests::kNumKeypoints * 3>;  // x, y in crop units and a weight
+using PatchView = std::span<const std::uint8_t>;                        // 256 x 256 x 3 RGB, row-major
+
+struct AdaptRequest {
+  PatchView patch;
+  CropKeypoints keypoints{};
+  int iterations = 10;
+  double stop_below = 0.0;  // crop units; 0 = never
+  double min_gain = 0.0;    // give up after gain_window iterations below this relative gain; 0 = never
+  int gain_window = 10;
+};
+
+struct AdaptOutcome {
+  BodyPrediction best;
+  std::vector<double> curve;  // L_proj of iterates 0..n, crop units
+  int best_iteration = 0;
+};
+
+// Loads checkpoint and SMAL asset; one caller at a time. Batches are formed from consecutive elements of the
+// span, so a result depends on nothing but the span.
+class Network {
+ public:
+  // Throws std::runtime_error (weights, asset, device) or ConfigError (device or dtype name).
+  Network(const NetworkConfig& network, const TtaConfig& tta);
+  ~Network();
+  Network(const Network&) = delete;
+  Network& operator=(const Network&) = delete;
+
+  std::vector<BodyPrediction> predict(std::span<const PatchView> patches);
+  std::vector<AdaptOutcome> adapt(std::span<const AdaptRequest> requests);
+
+  // "cpu (2 threads)", "cuda:0 NVIDIA H100 80GB HBM3": for people.
+  const std::string& device_description() const;
+  // A GPU that is present but cannot be used, and why; else empty.
+  const std::string& device_warning() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+// What of device and threads decides the bits: "cpu-2", "cuda". Part of the stage keys; loads nothing.
+// Throws as Network's constructor does.
+std::string device_key(const NetworkConfig& network);
+
+// A seeded checkpoint of a named size ("vith", "small", "tiny"). Throws ConfigError for another name.
+void write_initial_checkpoint(const std::filesystem::path& path, const std::string& size, std::uint64_t seed);
+
+// The synthetic quadruped (smal/synthetic_quadruped.h) as an asset file.
+void write_synthetic_asset(const std::filesystem::path& path);
+
+}  // namespace q3d::pipeline

@@ -1,0 +1,62 @@
+#include "pipeline/stage_store.h"
+
+#include <fmt/format.h>
+
+#include "pipeline/stages.h"
+
+namespace q3d::pipeline {
+namespace {
+
+std::filesystem::path opened(const std::filesystem::path& out, const std::string& stage,
+                             const std::string& key) {
+  std::filesystem::path folder = stage_folder(out, stage, key);
+  open_stage_folder(folder, stage, key);
+  return folder;
+}
+
+std::string file_name(const Unit& unit) {
+  return fmt::format("unit-{:06}.h5", unit.index);
+}
+
+}  // namespace
+
+StageStore::StageStore(const std::filesystem::path& out, const std::string& stage, const std::string& key)
+    : folder_(opened(out, stage, key)), journal_(folder_ / "journal.jsonl") {}
+
+std::filesystem::path StageStore::file(const Unit& unit) const {
+  return folder_ / file_name(unit);
+}
+
+std::optional<manifests::JournalEntry> StageStore::entry(const Unit& unit) const {
+  const std::lock_guard lock(mutex_);
+  return journal_.find(unit.index, unit.input_digest);
+}
+
+bool StageStore::has(const Unit& unit) const {
+  return entry(unit).has_value();
+}
+
+std::optional<manifests::Table> StageStore::load(const Unit& unit) const {
+  if (!has(unit)) return std::nullopt;
+  return manifests::read_table(file(unit));
+}
+
+void StageStore::save(const Unit& unit, const manifests::Table& table) {
+  save(unit, table.rows,
+       [&](const std::filesystem::path& path) { return manifests::write_table(path, table); });
+}
+
+void StageStore::save(const Unit& unit, std::int64_t rows,
+                      const std::function<std::string(const std::filesystem::path&)>& write) {
+  manifests::JournalEntry entry;
+  entry.unit = unit.index;
+  entry.input_digest = unit.input_digest;
+  entry.file = file_name(unit);
+  entry.sha256 = write(file(unit));
+  entry.bytes = static_cast<std::int64_t>(std::filesystem::file_size(file(unit)));
+  entry.rows = rows;
+  const std::lock_guard lock(mutex_);
+  journal_.append(entry);
+}
+
+}  // namespace q3d::pipeline

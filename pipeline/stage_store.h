@@ -1,0 +1,39 @@
+// One stage's folder: unit files and the journal that says which of them exist.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include "manifests/journal.h"
+#include "manifests/table.h"
+#include "pipeline/ingest.h"
+
+namespace q3d::pipeline {
+
+// Thread-safe: one thread may save units while another asks for them.
+class StageStore {
+ public:
+  // Opens or makes <out>/stages/<stage>-<key>/.
+  StageStore(const std::filesystem::path& out, const std::string& stage, const std::string& key);
+
+  bool has(const Unit& unit) const;
+  std::optional<manifests::Table> load(
+      const Unit& unit) const;  // throws std::runtime_error on a damaged file
+  void save(const Unit& unit, const manifests::Table& table);
+  // Records a file that `write` makes under the given path and whose SHA-256 it returns.
+  void save(const Unit& unit, std::int64_t rows,
+            const std::function<std::string(const std::filesystem::path&)>& write);
+
+  std::filesystem::path file(const Unit& unit) const;
+  std::optional<manifests::JournalEntry> entry(const Unit& unit) const;
+
+ private:
+  std::filesystem::path folder_;
+  mutable std::mutex mutex_;  // guards journal_
+  manifests::Journal journal_;
+};
+
+}  // namespace q3d::pipeline

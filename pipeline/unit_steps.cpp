@@ -1,0 +1,185 @@
+#include "pipeline/unit_steps.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <cmath>
+#include <limits>
+
+#include "filters/metrics.h"
+#include "loaders/crop.h"
+#include "loaders/encode.h"
+#include "loaders/image.h"
+#include "loaders/stored_crop.h"
+#include "pipeline/interrupt.h"
+
+namespace q3d::pipeline {
+namespace {
+
+using filters::Band;
+using manifests::Reason;
+using manifests::Verdict;
+
+Wanted wanted(const UnitWork& work, std::size_t i, const filters::Thresholds* thresholds) {
+  if (work.candidates[i].record.failure != Reason::none) return {};
+  if (!work.predicted) return {true, thresholds != nullptr && !work.shard_before};
+  if (thresholds == nullptr) return {};
+  const double error = initial_error(work.candidates[i], (*work.predicted)[i]);
+  if (std::isnan(error)) return {};
+  const Band band = filters::band(error, *thresholds);
+  const bool adapts = band == Band::refine && !work.refined;
+  const bool may_be_kept = work.refined ? work.judgements[i].verdict == Verdict::retained ||
+                                              work.judgements[i].verdict == Verdict::refined
+                                        : band != Band::discard;
+  return {adapts, may_be_kept && !work.shard_before};
+}
+
+void store_crop(DecodedSample& sample, const cv::Mat& rgb, const cv::Mat& mask, const loaders::SquareBox& box,
+                const ShardConfig& shards) {
+  const loaders::StoredCrop crop =
+      loaders::make_stored_crop(rgb, mask, box, shards.crop_scale, shards.crop_min_side_px);
+  sample.stored_side_px = crop.rgb.cols;
+  sample.stored_from_image = crop.from_image;
+  if (shards.images == "reference") return;
+  sample.stored_crop = shards.images == "png" ? loaders::encode_png(crop.rgb)
+                                              : loaders::encode_jpeg(crop.rgb, shards.jpeg_quality);
+  if (!crop.mask.empty()) sample.stored_mask = loaders::encode_png(crop.mask);
+}
+
+manifests::Judgement failed(Reason reason, const std::string& detail) {
+  manifests::Judgement judgement;
+  judgement.verdict = Verdict::failed;
+  judgement.reason = reason;
+  judgement.detail = detail;
+  return judgement;
+}
+
+}  // namespace
+
+DecodedSample decode_sample(const manifests::SampleRecord& record, Wanted want, const ShardConfig& shards) {
+  DecodedSample sample;
+  const loaders::DecodedImage image = loaders::decode_image(record.image_path);
+  if (image.failure != Reason::none) {
+    sample.failure = image.failure;
+    sample.detail = image.detail;
+    return sample;
+  }
+  // A mask that is absent, unreadable or no silhouette leaves the sample without one.
+  const cv::Mat silhouette = loaders::decode_mask(record.mask_path).silhouette;
+  const bool has_mask = silhouette.size() == image.rgb.size();
+  sample.image_width_px = image.rgb.cols;
+  sample.image_height_px = image.rgb.rows;
+  sample.has_mask = has_mask;
+  const manifests::Box& box = record.box;
+  if (box.x_px >= image.rgb.cols || box.y_px >= image.rgb.rows || box.x_px + box.w_px <= 0 ||
+      box.y_px + box.h_px <= 0) {
+    sample.failure = Reason::box_outside_image;
+    sample.detail = fmt::format("box x={} y={} w={} h={} px, picture {} x {} px", box.x_px, box.y_px,
+                                box.w_px, box.h_px, image.rgb.cols, image.rgb.rows);
+    return sample;
+  }
+  const loaders::SquareBox square = loaders::square_box(box);
+  if (want.patch) {
+    const cv::Mat patch = loaders::make_patch(image.rgb, cv::Mat(), square).rgb;
+    sample.patch.assign(patch.datastart, patch.dataend);
+  }
+  if (want.stored_crop) store_crop(sample, image.rgb, has_mask ? silhouette : cv::Mat(), square, shards);
+  sample.decoded = true;
+  return sample;
+}
+
+CropKeypoints crop_keypoints(const manifests::SampleRecord& record) {
+  const loaders::SquareBox box = loaders::square_box(record.box);
+  return loaders::keypoints_to_crop(record.keypoints, loaders::patch_from_image(box, loaders::kPatchSidePx));
+}
+
+double initial_error(const Candidate& candidate, const PredictedSample& predicted) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  if (predicted.failure != Reason::none) return kNone;
+  return filters::projection_error(predicted.body.keypoints_2d, crop_keypoints(candidate.record))
+      .value_or(kNone);
+}
+
+void decode_unit(UnitWork& work, const ShardConfig& shards, const filters::Thresholds* thresholds) {
+  work.decoded.assign(work.candidates.size(), {});
+  tbb::parallel_for(std::size_t{0}, work.candidates.size(), [&](std::size_t i) {
+    if (interrupted()) return;
+    const Wanted want = wanted(work, i, thresholds);
+    if (want.patch || want.stored_crop)
+      work.decoded[i] = decode_sample(work.candidates[i].record, want, shards);
+  });
+}
+
+void predict_unit(UnitWork& work, Network& network) {
+  if (work.predicted) return;
+  std::vector<PredictedSample> samples(work.candidates.size());
+  std::vector<PatchView> patches;
+  std::vector<std::size_t> positions;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const manifests::SampleRecord& record = work.candidates[i].record;
+    const DecodedSample& decoded = work.decoded[i];
+    samples[i].failure = record.failure != Reason::none ? record.failure : decoded.failure;
+    samples[i].detail = record.failure != Reason::none ? record.failure_detail : decoded.detail;
+    samples[i].image_width_px = decoded.image_width_px;
+    samples[i].image_height_px = decoded.image_height_px;
+    samples[i].has_mask = decoded.has_mask;
+    if (samples[i].failure != Reason::none) continue;
+    patches.emplace_back(decoded.patch);
+    positions.push_back(i);
+  }
+  const std::vector<BodyPrediction> bodies = network.predict(patches);
+  for (std::size_t j = 0; j < bodies.size(); ++j) {
+    PredictedSample& sample = samples[positions[j]];
+    if (is_finite(bodies[j])) {
+      sample.body = bodies[j];
+    } else {
+      sample.failure = Reason::prediction_not_finite;
+      sample.detail = "the network's output holds NaN or infinity";
+    }
+  }
+  work.predicted = std::move(samples);
+}
+
+void judge_unit(UnitWork& work, const filters::Thresholds& thresholds) {
+  work.judgements.assign(work.candidates.size(), {});
+  for (std::size_t i = 0; i < work.candidates.size(); ++i) {
+    const PredictedSample& predicted = (*work.predicted)[i];
+    work.judgements[i] =
+        predicted.failure != Reason::none
+            ? failed(predicted.failure, predicted.detail)
+            : filters::judge_initial(initial_error(work.candidates[i], predicted), thresholds);
+  }
+  if (!work.refined) return;
+  for (const RefinedSample& refined : *work.refined) {
+    work.judgements[refined.sample] =
+        refined.curve.empty()
+            ? failed(Reason::prediction_not_finite, "nothing could be measured in adaptation")
+            : filters::judge_adapted(refined.curve, thresholds);
+  }
+}
+
+void refine_unit(UnitWork& work, Network& network, const filters::Thresholds& thresholds) {
+  if (work.refined) return;
+  std::vector<AdaptRequest> requests;
+  std::vector<RefinedSample> samples;
+  for (std::size_t i = 0; i < work.candidates.size(); ++i) {
+    const double error = initial_error(work.candidates[i], (*work.predicted)[i]);
+    if (std::isnan(error) || filters::band(error, thresholds) != Band::refine) continue;
+    AdaptRequest& request = requests.emplace_back();
+    request.patch = work.decoded[i].patch;
+    request.keypoints = crop_keypoints(work.candidates[i].record);
+    request.iterations = filters::adaptation_iterations(error, thresholds);
+    request.stop_below = thresholds.tau_low;
+    request.min_gain = thresholds.delta;
+    request.gain_window = thresholds.gain_window;
+    samples.emplace_back().sample = i;
+  }
+  std::vector<AdaptOutcome> outcomes = network.adapt(requests);
+  for (std::size_t j = 0; j < outcomes.size(); ++j) {
+    samples[j].curve = std::move(outcomes[j].curve);
+    samples[j].body = outcomes[j].best;
+  }
+  work.refined = std::move(samples);
+}
+
+}  // namespace q3d::pipeline

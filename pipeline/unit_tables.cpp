@@ -1,0 +1,143 @@
+#include "pipeline/unit_tables.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstring>
+#include <stdexcept>
+
+namespace q3d::pipeline {
+namespace {
+
+using manifests::Table;
+
+// One array member of every row, end to end.
+template <typename Row, std::size_t N>
+void add_field(Table& table, const std::string& name, const std::vector<Row>& rows,
+               std::vector<std::int64_t> row_shape, std::array<float, N> BodyPrediction::*field) {
+  std::vector<float> values;
+  values.reserve(rows.size() * N);
+  for (const Row& row : rows) {
+    const auto& source = row.body.*field;
+    values.insert(values.end(), source.begin(), source.end());
+  }
+  table.add<float>(name, std::move(row_shape), values);
+}
+
+template <typename Row, std::size_t N>
+void read_field(const Table& table, const std::string& name, std::vector<Row>& rows,
+                std::array<float, N> BodyPrediction::*field) {
+  const std::span<const float> values = table.column<float>(name);
+  if (values.size() != rows.size() * N) {
+    throw std::runtime_error(fmt::format("column {} holds {} numbers, expected {} rows of {}", name,
+                                         values.size(), rows.size(), N));
+  }
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(i * N), N, (rows[i].body.*field).begin());
+  }
+}
+
+// The fields of a body, named once for writing and reading.
+template <typename Visitor>
+void visit_body(Visitor&& visit) {
+  visit("rotations", std::vector<std::int64_t>{manifests::kNumJoints, 3, 3}, &BodyPrediction::rotations);
+  visit("betas", std::vector<std::int64_t>{manifests::kNumBetas}, &BodyPrediction::betas);
+  visit("camera", std::vector<std::int64_t>{3}, &BodyPrediction::camera);
+  visit("translation", std::vector<std::int64_t>{3}, &BodyPrediction::translation);
+  visit("keypoints_3d", std::vector<std::int64_t>{manifests::kNumKeypoints, 3},
+        &BodyPrediction::keypoints_3d);
+  visit("keypoints_2d", std::vector<std::int64_t>{manifests::kNumKeypoints, 2},
+        &BodyPrediction::keypoints_2d);
+  visit("aux_keypoints_2d", std::vector<std::int64_t>{manifests::kNumKeypoints, 2},
+        &BodyPrediction::aux_keypoints_2d);
+}
+
+template <typename Row>
+void add_bodies(Table& table, const std::vector<Row>& rows) {
+  visit_body([&](const char* name, std::vector<std::int64_t> shape, auto field) {
+    add_field(table, name, rows, std::move(shape), field);
+  });
+}
+
+template <typename Row>
+void read_bodies(const Table& table, std::vector<Row>& rows) {
+  visit_body([&](const char* name, const std::vector<std::int64_t>&, auto field) {
+    read_field(table, name, rows, field);
+  });
+}
+
+const std::vector<std::string>& text_column(const Table& table, const std::string& name) {
+  const auto found = table.text.find(name);
+  if (found == table.text.end()) throw std::runtime_error("text column " + name + " is missing");
+  return found->second;
+}
+
+}  // namespace
+
+Table to_table(const std::vector<PredictedSample>& samples) {
+  Table table;
+  table.rows = static_cast<std::int64_t>(samples.size());
+  std::vector<std::int32_t> image_size;
+  std::vector<std::uint8_t> has_mask;
+  for (const PredictedSample& sample : samples) {
+    image_size.insert(image_size.end(), {sample.image_width_px, sample.image_height_px});
+    has_mask.push_back(sample.has_mask ? 1 : 0);
+    table.text["failure"].emplace_back(manifests::to_string(sample.failure));
+    table.text["detail"].push_back(sample.detail);
+  }
+  table.add<std::int32_t>("image_size_px", {2}, image_size);
+  table.add<std::uint8_t>("has_mask", {}, has_mask);
+  add_bodies(table, samples);
+  return table;
+}
+
+std::vector<PredictedSample> predicted_from_table(const Table& table) {
+  std::vector<PredictedSample> samples(static_cast<std::size_t>(table.rows));
+  if (samples.empty()) return samples;
+  const auto image_size = table.column<std::int32_t>("image_size_px");
+  const auto has_mask = table.column<std::uint8_t>("has_mask");
+  const auto& failure = text_column(table, "failure");
+  const auto& detail = text_column(table, "detail");
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    samples[i].failure = manifests::reason_from_string(failure[i]);
+    samples[i].detail = detail[i];
+    samples[i].image_width_px = image_size[2 * i];
+    samples[i].image_height_px = image_size[2 * i + 1];
+    samples[i].has_mask = has_mask[i] != 0;
+  }
+  read_bodies(table, samples);
+  return samples;
+}
+
+Table to_table(const std::vector<RefinedSample>& samples) {
+  Table table;
+  table.rows = static_cast<std::int64_t>(samples.size());
+  std::vector<std::int64_t> positions;
+  auto& curves = table.blobs["curve"];  // float64 L_proj of iterates 0..n
+  for (const RefinedSample& sample : samples) {
+    positions.push_back(static_cast<std::int64_t>(sample.sample));
+    const auto bytes = std::as_bytes(std::span(sample.curve));
+    curves.emplace_back(bytes.begin(), bytes.end());
+  }
+  table.add<std::int64_t>("sample", {}, positions);
+  add_bodies(table, samples);
+  return table;
+}
+
+std::vector<RefinedSample> refined_from_table(const Table& table) {
+  std::vector<RefinedSample> samples(static_cast<std::size_t>(table.rows));
+  if (samples.empty()) return samples;
+  const auto positions = table.column<std::int64_t>("sample");
+  const auto curves = table.blobs.find("curve");
+  if (curves == table.blobs.end()) throw std::runtime_error("blob column curve is missing");
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    samples[i].sample = static_cast<std::size_t>(positions[i]);
+    const auto& bytes = curves->second[i];
+    samples[i].curve.resize(bytes.size() / sizeof(double));
+    std::memcpy(samples[i].curve.data(), bytes.data(), samples[i].curve.size() * sizeof(double));
+  }
+  read_bodies(table, samples);
+  return samples;
+}
+
+}  // namespace q3d::pipeline

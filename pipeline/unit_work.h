@@ -1,0 +1,61 @@
+// The one item that travels through the flow graph: a unit and what the stages have made of it so far.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "loaders/crop.h"
+#include "manifests/verdict.h"
+#include "pipeline/ingest.h"
+#include "pipeline/network.h"
+
+namespace q3d::pipeline {
+
+// What predict knows of one candidate: a body, or why there is none.
+struct PredictedSample {
+  manifests::Reason failure = manifests::Reason::none;
+  std::string detail;
+  int image_width_px = 0;
+  int image_height_px = 0;
+  bool has_mask = false;
+  BodyPrediction body;  // meaningful when failure is none
+};
+
+// What refine knows of one candidate of the middle band.
+struct RefinedSample {
+  std::size_t sample = 0;     // position within the unit
+  std::vector<double> curve;  // L_proj of iterates 0..n, crop units
+  BodyPrediction body;        // the iterate of least L_proj
+};
+
+// A decoded picture, as far as later stages need it.
+struct DecodedSample {
+  bool decoded = false;
+  manifests::Reason failure = manifests::Reason::none;
+  std::string detail;
+  int image_width_px = 0;
+  int image_height_px = 0;
+  bool has_mask = false;
+  std::vector<std::uint8_t> patch;     // 256 x 256 x 3 RGB: the network's crop
+  std::vector<std::byte> stored_crop;  // encoded; empty when not asked for
+  std::vector<std::byte> stored_mask;
+  int stored_side_px = 0;
+  std::array<double, 6> stored_from_image{};
+};
+
+struct UnitWork {
+  const Unit* unit = nullptr;
+  std::span<const Candidate> candidates;  // the unit's own
+
+  // Filled from the journal where an earlier run had finished the stage, else by the stage's node.
+  std::optional<std::vector<PredictedSample>> predicted;
+  std::optional<std::vector<RefinedSample>> refined;
+  bool predicted_before = false;
+  bool refined_before = false;
+  bool shard_before = false;
+
+  std::vector<DecodedSample> decoded;            // by position; freed once the shard is written
+  std::vector<manifests::Judgement> judgements;  // by position
+};
+
+}  // namespace q3d::pipeline

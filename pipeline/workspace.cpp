@@ -1,0 +1,51 @@
+#include "pipeline/workspace.h"
+
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <thread>
+
+namespace q3d::pipeline {
+namespace {
+
+std::size_t flow_threads(int wanted) {
+  if (wanted > 0) return static_cast<std::size_t>(wanted);
+  return std::max<std::size_t>(1, std::thread::hardware_concurrency());
+}
+
+std::filesystem::path made(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) {
+    throw std::runtime_error(
+        fmt::format("{}: cannot make the output folder: {}", folder.string(), error.message()));
+  }
+  return folder;
+}
+
+}  // namespace
+
+Workspace::Workspace(const BuildConfig& config, const RunOptions& options)
+    : config_(config),
+      options_(options),
+      threads_(tbb::global_control::max_allowed_parallelism, flow_threads(options.threads)),
+      lock_(made(options.out)),
+      digests_(options.out / "digests.txt"),
+      assets_(digest_assets(config.network, digests_)),
+      device_key_(pipeline::device_key(config.network)),
+      ingest_(pipeline::ingest(config, digests_)) {
+  if (options_.quiet) return;
+  fmt::print(stderr, "{} candidates in {} units\n", ingest_.candidates.size(), ingest_.units.size());
+  for (const std::string& note : ingest_.notes) fmt::print(stderr, "note: {}\n", note);
+}
+
+Network& Workspace::network() {
+  if (!network_) {
+    network_ = std::make_unique<Network>(config_.network, config_.tta);
+    if (!network_->device_warning().empty()) fmt::print(stderr, "warning: {}\n", network_->device_warning());
+    if (!options_.quiet) fmt::print(stderr, "network on {}\n", network_->device_description());
+  }
+  return *network_;
+}
+
+}  // namespace q3d::pipeline

@@ -1,0 +1,81 @@
+#include "manifests/atomic_file.h"
+
+#include <gmock/gmock.h>
+
+#include <fstream>
+
+#include "tests/manifests/full_disk.h"
+#include "tests/support/paths.h"
+
+namespace q3d::manifests {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
+
+std::size_t count_files(const fs::path& folder) {
+  return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder), fs::directory_iterator()));
+}
+
+TEST(AtomicFile, WritesAndReplacesWholeFiles) {
+  const testing::ScratchDir scratch;
+  const fs::path path = scratch.path() / "a.json";
+  write_file_atomically(path, "first");
+  EXPECT_EQ(read_file(path), "first");
+  write_file_atomically(path, "");
+  EXPECT_EQ(read_file(path), "");
+  EXPECT_EQ(count_files(scratch.path()), 1U);
+}
+
+TEST(AtomicFile, FullDiskKeepsTheOldFileAndLeavesNoTemporary) {
+  const testing::ScratchDir scratch;
+  const fs::path path = scratch.path() / "a.bin";
+  write_file_atomically(path, "old");
+  {
+    const testing::FullDisk full(4096);
+    EXPECT_THAT(
+        [&] { write_file_atomically(path, std::string(10'000, 'x')); },
+        ThrowsMessage<std::runtime_error>(AllOf(HasSubstr(path.string()), HasSubstr("File too large"))));
+  }
+  EXPECT_EQ(read_file(path), "old");
+  EXPECT_EQ(count_files(scratch.path()), 1U);
+}
+
+TEST(AtomicFile, NamesThePathThatCannotBeWrittenOrRead) {
+  const testing::ScratchDir scratch;
+  const fs::path path = scratch.path() / "absent" / "a.json";
+  const auto names_it = AllOf(HasSubstr(path.string()), HasSubstr("No such file or directory"));
+  EXPECT_THAT([&] { write_file_atomically(path, "x"); }, ThrowsMessage<std::runtime_error>(names_it));
+  EXPECT_THAT([&] { read_file(path); }, ThrowsMessage<std::runtime_error>(names_it));
+}
+
+TEST(AtomicFile, CommitGivesTheNameOrRemovesTheTemporary) {
+  const testing::ScratchDir scratch;
+  const fs::path temporary = scratch.path() / "a.tmp";
+  std::ofstream(temporary) << "content";
+  commit_file(temporary, scratch.path() / "a");
+  EXPECT_EQ(read_file(scratch.path() / "a"), "content");
+  EXPECT_FALSE(fs::exists(temporary));
+
+  std::ofstream(temporary) << "content";
+  fs::create_directories(scratch.path() / "folder" / "not_empty");
+  EXPECT_THROW(commit_file(temporary, scratch.path() / "folder"), std::runtime_error);
+  EXPECT_FALSE(fs::exists(temporary));
+}
+
+TEST(AtomicFile, RemovesOnlyTemporaries) {
+  const testing::ScratchDir scratch;
+  for (const char* name : {"a.tmp", "b.17.0.tmp", "keep.h5", "tmp"})
+    std::ofstream(scratch.path() / name) << "x";
+  fs::create_directory(scratch.path() / "folder.tmp");
+  remove_temporaries(scratch.path());
+  EXPECT_FALSE(fs::exists(scratch.path() / "a.tmp"));
+  EXPECT_FALSE(fs::exists(scratch.path() / "b.17.0.tmp"));
+  EXPECT_EQ(count_files(scratch.path()), 3U);
+  EXPECT_THROW(remove_temporaries(scratch.path() / "absent"), std::runtime_error);
+}
+
+}  // namespace
+}  // namespace q3d::manifests

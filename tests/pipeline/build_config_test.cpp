@@ -1,0 +1,146 @@
+#include "pipeline/build_config.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "pipeline/errors.h"
+#include "tests/support/paths.h"
+
+namespace q3d::pipeline {
+namespace {
+
+using nlohmann::json;
+
+json good() {
+  return json::parse(R"({
+    "name": "q", "version": "1.2.3",
+    "datasets": [{"name": "a", "format": "prima", "root": "r", "annotations": "train.json", "split": "train"}],
+    "network": {"checkpoint": "c.safetensors", "smal_asset": "s.safetensors", "device": "cpu", "dtype": "float32",
+                "batch": 4, "compute_threads": 1},
+    "tta": {"objective": "demo", "learning_rate": 0.001, "aux_weight": 1, "reproj_weight": 2, "iterations_min": 5,
+            "iterations_max": 6, "batch": 3},
+    "filter": {"tau_low": 0.1, "tau_high": 0.2, "delta": 0.03},
+    "shards": {"unit_size": 10, "images": "png", "jpeg_quality": 90, "crop_scale": 2, "crop_min_side_px": 300},
+    "calibrate": {"retained": 0.5, "refined": 0.25}})");
+}
+
+TEST(BuildConfig, ReadsEveryKey) {
+  const BuildConfig config = parse_build_config(good(), "t");
+  EXPECT_EQ(config.name, "q");
+  EXPECT_EQ(config.version, "1.2.3");
+  ASSERT_EQ(config.datasets.size(), 1U);
+  EXPECT_EQ(config.datasets[0].format, "prima");
+  EXPECT_EQ(config.datasets[0].split, "train");
+  EXPECT_EQ(config.network.batch, 4);
+  EXPECT_EQ(config.network.compute_threads, 1);
+  EXPECT_EQ(config.tta.objective, "demo");
+  EXPECT_EQ(config.tta.iterations_max, 6);
+  EXPECT_EQ(config.shards.images, "png");
+  EXPECT_DOUBLE_EQ(config.shards.crop_scale, 2.0);
+  EXPECT_DOUBLE_EQ(config.calibrate.refined, 0.25);
+  const filters::Thresholds limits = thresholds(config);
+  EXPECT_DOUBLE_EQ(limits.tau_low, 0.1);
+  EXPECT_DOUBLE_EQ(limits.tau_high, 0.2);
+  EXPECT_DOUBLE_EQ(limits.delta, 0.03);
+  EXPECT_EQ(limits.iterations_min, 5);
+}
+
+// One good config, broken one key at a time.
+struct Mutation {
+  const char* pointer;
+  const char* value;
+  const char* expected;  // part of the message
+};
+
+class BrokenConfig : public ::testing::TestWithParam<Mutation> {};
+
+TEST_P(BrokenConfig, IsRefusedWithTheReason) {
+  json config = good();
+  config[json::json_pointer(GetParam().pointer)] = json::parse(GetParam().value);
+  try {
+    thresholds(parse_build_config(config, "t"));
+    FAIL() << "accepted " << GetParam().pointer << " = " << GetParam().value;
+  } catch (const ConfigError& error) {
+    EXPECT_NE(std::string(error.what()).find(GetParam().expected), std::string::npos) << error.what();
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Keys, BrokenConfig,
+    ::testing::Values(
+        Mutation{"/nmae", "1", "did you mean \"name\"?"}, Mutation{"/name", "\"a/b\"", "becomes a folder"},
+        Mutation{"/version", "\"1\"", "must look like 1.0.0"},
+        Mutation{"/datasets", "[]", "at least one dataset"}, Mutation{"/datasets", "{}", "must be a list"},
+        Mutation{"/datasets/0/format", "\"prma\"", "Did you mean \"prima\"?"},
+        Mutation{"/datasets/0/rot", "\"x\"", "did you mean \"root\"?"},
+        Mutation{"/datasets/0/name", "\"../x\"", "letters, digits"},
+        Mutation{"/network/dtype", "\"float16\"", "float32, bfloat16"},
+        Mutation{"/network/batch", "0", "at least 1"},
+        Mutation{"/network/compute_threads", "-1", "0 (all cores) or more"},
+        Mutation{"/tta/objective", "\"papr\"", "Did you mean \"paper\"?"},
+        Mutation{"/tta/learning_rate", "0", "greater than 0"},
+        Mutation{"/tta/iterations_min", "7", "iterations_min <= iterations_max"},
+        Mutation{"/tta/batch", "0", "at least 1"}, Mutation{"/filter/tau_low", "0.3", "filter: "},
+        Mutation{"/filter/delta", "\"x\"", "must be a number"},
+        Mutation{"/shards/unit_size", "0", "1 to 65536"},
+        Mutation{"/shards/images", "\"gif\"", "jpeg, png, reference"},
+        Mutation{"/shards/jpeg_quality", "101", "1 to 100"}, Mutation{"/shards/crop_scale", "0.5", "1 to 4"},
+        Mutation{"/shards/crop_min_side_px", "100", "256 to 2048"},
+        Mutation{"/calibrate/retained", "0.9", "sum less than 1"}));
+
+TEST(BuildConfig, OneTauAloneIsRefused) {
+  json config = good();
+  config["filter"].erase("tau_high");
+  EXPECT_THROW(parse_build_config(config, "t"), ConfigError);
+}
+
+TEST(BuildConfig, WithoutThresholdsItNamesCalibrate) {
+  json config = good();
+  config.erase("filter");
+  const BuildConfig parsed = parse_build_config(config, "t");
+  try {
+    thresholds(parsed);
+    FAIL();
+  } catch (const ConfigError& error) {
+    EXPECT_NE(std::string(error.what()).find("quadruped3d calibrate"), std::string::npos);
+  }
+}
+
+TEST(BuildConfig, TwoDatasetsOfOneNameAndSplitAreRefused) {
+  json config = good();
+  config["datasets"].push_back(config["datasets"][0]);
+  EXPECT_THROW(parse_build_config(config, "t"), ConfigError);
+}
+
+TEST(BuildConfig, LayersAndPathsRelativeToTheirFile) {
+  const testing::ScratchDir scratch;
+  std::filesystem::create_directories(scratch.path() / "layer");
+  json base = good();
+  base.erase("filter");
+  std::ofstream(scratch.path() / "base.json") << base.dump();
+  std::ofstream(scratch.path() / "layer/top.json")
+      << R"({"filter": {"tau_low": 0.3, "tau_high": 0.4}, "network": {"checkpoint": "other.safetensors"}})";
+  const BuildConfig config =
+      load_build_config({scratch.path() / "base.json", scratch.path() / "layer/top.json"});
+  EXPECT_DOUBLE_EQ(*config.filter.tau_low, 0.3);
+  EXPECT_EQ(config.network.checkpoint, scratch.path() / "layer/other.safetensors");
+  EXPECT_EQ(config.network.smal_asset, scratch.path() / "s.safetensors");
+  EXPECT_EQ(config.datasets[0].root, scratch.path() / "r");
+  EXPECT_EQ(config.as_written["network"]["smal_asset"],
+            "s.safetensors");  // no path of this machine is recorded
+}
+
+TEST(BuildConfig, BrokenJsonNamesTheFile) {
+  const testing::ScratchDir scratch;
+  std::ofstream(scratch.path() / "cut.json") << R"({"name": "q", "datasets": [)";
+  try {
+    load_build_config({scratch.path() / "cut.json"});
+    FAIL();
+  } catch (const ConfigError& error) {
+    EXPECT_NE(std::string(error.what()).find("cut.json: not valid JSON"), std::string::npos) << error.what();
+  }
+}
+
+}  // namespace
+}  // namespace q3d::pipeline

@@ -1,0 +1,103 @@
+#include "pipeline/stages.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "tests/support/paths.h"
+
+namespace q3d::pipeline {
+namespace {
+
+struct Inputs {
+  BuildConfig config;
+  filters::Thresholds limits;
+  Ingest ingest;
+  AssetDigests assets{"checkpoint", "asset"};
+  std::string device = "cpu-2";
+
+  Inputs() {
+    config.datasets.push_back(
+        {.name = "a", .format = "prima", .split = "train", .root = "r", .annotations = "t", .images = ""});
+    ingest.annotation_digests["a/train"] = "digest";
+    ingest.units.push_back({0, 0, 1, "unit"});
+    limits.tau_low = 0.1;
+    limits.tau_high = 0.2;
+  }
+  StageKeys keys() const { return stage_keys(config, limits, ingest, assets, device); }
+};
+
+TEST(StageKeys, AChangedTauKeepsPredictionsAndRedoesTheRest) {
+  Inputs inputs;
+  const StageKeys before = inputs.keys();
+  inputs.limits.tau_low = 0.11;
+  const StageKeys after = inputs.keys();
+  EXPECT_EQ(before.ingest, after.ingest);
+  EXPECT_EQ(before.predict, after.predict);
+  EXPECT_NE(before.fidelity, after.fidelity);
+  EXPECT_NE(before.refine, after.refine);
+  EXPECT_NE(before.shards, after.shards);
+  EXPECT_NE(before.dataset, after.dataset);
+}
+
+TEST(StageKeys, AddedPhotosMakeANewVersionFromTheSameUnits) {
+  Inputs inputs;
+  const StageKeys before = inputs.keys();
+  inputs.ingest.units.push_back({1, 1, 1, "more"});
+  const StageKeys after = inputs.keys();
+  EXPECT_NE(before.ingest, after.ingest);
+  EXPECT_EQ(before.predict, after.predict);
+  EXPECT_EQ(before.shards, after.shards);
+  EXPECT_NE(before.dataset, after.dataset);
+}
+
+TEST(StageKeys, WhatDecidesPredictionsIsInTheirKey) {
+  const Inputs inputs;
+  const std::string before = inputs.keys().predict;
+  const auto changed = [&](auto&& change) {
+    Inputs other;
+    change(other);
+    return other.keys().predict;
+  };
+  EXPECT_NE(before, changed([](Inputs& i) { i.assets.checkpoint = "x"; }));
+  EXPECT_NE(before, changed([](Inputs& i) { i.assets.smal_asset = "x"; }));
+  EXPECT_NE(before, changed([](Inputs& i) { i.device = "cpu-1"; }));
+  EXPECT_NE(before, changed([](Inputs& i) { i.config.network.batch = 3; }));
+  EXPECT_NE(before, changed([](Inputs& i) { i.config.network.dtype = "bfloat16"; }));
+  EXPECT_NE(before, changed([](Inputs& i) { i.config.shards.unit_size = 3; }));
+  EXPECT_EQ(before, changed([](Inputs& i) { i.config.tta.learning_rate = 3; }));
+  EXPECT_EQ(before, changed([](Inputs& i) { i.config.datasets[0].root = "elsewhere"; }));
+}
+
+TEST(StageKeys, WhatDecidesRefinementsAndShardsIsInTheirKeys) {
+  const Inputs inputs;
+  const StageKeys before = inputs.keys();
+  Inputs rate;
+  rate.config.tta.learning_rate = 1e-3;
+  EXPECT_EQ(before.fidelity, rate.keys().fidelity);
+  EXPECT_NE(before.refine, rate.keys().refine);
+  Inputs quality;
+  quality.config.shards.jpeg_quality = 50;
+  EXPECT_EQ(before.refine, quality.keys().refine);
+  EXPECT_NE(before.shards, quality.keys().shards);
+}
+
+TEST(StageFolder, RefusesAFolderOfAnotherKey) {
+  const testing::ScratchDir scratch;
+  const auto folder = stage_folder(scratch.path(), "predict", std::string(64, 'a'));
+  open_stage_folder(folder, "predict", std::string(64, 'a'));
+  open_stage_folder(folder, "predict", std::string(64, 'a'));
+  EXPECT_THROW(open_stage_folder(folder, "predict", std::string(64, 'b')), std::runtime_error);
+}
+
+TEST(StageFolder, RemovesTornTemporaries) {
+  const testing::ScratchDir scratch;
+  const auto folder = stage_folder(scratch.path(), "predict", std::string(64, 'a'));
+  open_stage_folder(folder, "predict", std::string(64, 'a'));
+  std::ofstream(folder / "unit-000000.h5.tmp") << "half";
+  open_stage_folder(folder, "predict", std::string(64, 'a'));
+  EXPECT_FALSE(std::filesystem::exists(folder / "unit-000000.h5.tmp"));
+}
+
+}  // namespace
+}  // namespace q3d::pipeline

@@ -1,0 +1,90 @@
+#include "pipeline/unit_tables.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/support/paths.h"
+
+namespace q3d::pipeline {
+namespace {
+
+// Distinct numbers in every field, so that a swapped or shifted column shows.
+BodyPrediction numbered(float first) {
+  BodyPrediction body;
+  float value = first;
+  const auto fill = [&](auto& field) {
+    for (float& element : field) element = value += 0.25F;
+  };
+  fill(body.rotations);
+  fill(body.betas);
+  fill(body.camera);
+  fill(body.translation);
+  fill(body.keypoints_3d);
+  fill(body.keypoints_2d);
+  fill(body.aux_keypoints_2d);
+  return body;
+}
+
+void expect_equal(const BodyPrediction& a, const BodyPrediction& b) {
+  EXPECT_EQ(a.rotations, b.rotations);
+  EXPECT_EQ(a.betas, b.betas);
+  EXPECT_EQ(a.camera, b.camera);
+  EXPECT_EQ(a.translation, b.translation);
+  EXPECT_EQ(a.keypoints_3d, b.keypoints_3d);
+  EXPECT_EQ(a.keypoints_2d, b.keypoints_2d);
+  EXPECT_EQ(a.aux_keypoints_2d, b.aux_keypoints_2d);
+}
+
+TEST(UnitTables, PredictionsSurviveTheDisk) {
+  const testing::ScratchDir scratch;
+  std::vector<PredictedSample> samples(3);
+  samples[0] = {manifests::Reason::none, "", 640, 480, true, numbered(0)};
+  samples[1] = {manifests::Reason::image_truncated, "ends at byte 17", 0, 0, false, {}};
+  samples[2] = {manifests::Reason::none, "", 1, 2, false, numbered(1000)};
+  manifests::write_table(scratch.path() / "t.h5", to_table(samples));
+  const auto back = predicted_from_table(manifests::read_table(scratch.path() / "t.h5"));
+  ASSERT_EQ(back.size(), samples.size());
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    EXPECT_EQ(back[i].failure, samples[i].failure);
+    EXPECT_EQ(back[i].detail, samples[i].detail);
+    EXPECT_EQ(back[i].image_width_px, samples[i].image_width_px);
+    EXPECT_EQ(back[i].image_height_px, samples[i].image_height_px);
+    EXPECT_EQ(back[i].has_mask, samples[i].has_mask);
+    expect_equal(back[i].body, samples[i].body);
+  }
+}
+
+TEST(UnitTables, RefinementsSurviveTheDiskWithCurvesOfDifferentLengths) {
+  const testing::ScratchDir scratch;
+  std::vector<RefinedSample> samples = {
+      {4, {0.5, 0.25, 0.125}, numbered(3)}, {9, {0.7}, numbered(7)}, {11, {}, {}}};
+  manifests::write_table(scratch.path() / "t.h5", to_table(samples));
+  const auto back = refined_from_table(manifests::read_table(scratch.path() / "t.h5"));
+  ASSERT_EQ(back.size(), samples.size());
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    EXPECT_EQ(back[i].sample, samples[i].sample);
+    EXPECT_EQ(back[i].curve, samples[i].curve);
+    expect_equal(back[i].body, samples[i].body);
+  }
+}
+
+TEST(UnitTables, AnEmptyUnitIsATable) {
+  const testing::ScratchDir scratch;
+  manifests::write_table(scratch.path() / "t.h5", to_table(std::vector<RefinedSample>()));
+  EXPECT_TRUE(refined_from_table(manifests::read_table(scratch.path() / "t.h5")).empty());
+}
+
+TEST(UnitTables, AMissingColumnIsNamed) {
+  manifests::Table table = to_table(std::vector<PredictedSample>(1));
+  table.numeric.erase("betas");
+  try {
+    predicted_from_table(table);
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_NE(std::string(error.what()).find("betas"), std::string::npos) << error.what();
+  }
+}
+
+}  // namespace
+}  // namespace q3d::pipeline

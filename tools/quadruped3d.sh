@@ -1,0 +1,28 @@
+#!/usr/bin/env bash
+# The main job behind `make quadruped3d`: OUT, and optionally a config. Without a config it makes the rendered sample
+# world and the default network first, so that a newcomer sees a dataset within minutes and without any licence.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+out=${1:?usage: tools/quadruped3d.sh OUT [CONFIG]}
+config=${2:-}
+program=build/quadruped3d
+mkdir -p "$out"
+
+if [ -z "$config" ]; then
+  config=configs/sample.json
+  [ -f data/world/world.json ] || "$program" sample --out data/world --share 0.08
+  [ -f data/small.safetensors ] || "$program" init --size small --out data/small.safetensors
+fi
+
+layers=(--config "$config")
+if ! grep -q '"tau_low"' "$config"; then
+  # One thresholds file a config: thresholds of another pool or network would be wrong.
+  thresholds=$out/thresholds-$(basename "$config" .json).json
+  [ -f "$thresholds" ] || "$program" calibrate "${layers[@]}" --out "$out" --write "$thresholds"
+  layers+=(--config "$thresholds")
+fi
+
+"$program" build "${layers[@]}" --out "$out"
+"$program" verify "$out"
+"$program" inspect "$out" --sheet "$out/sheet.png"
