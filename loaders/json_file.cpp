@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <fstream>
 #include <stdexcept>
+#include <string_view>
 
 namespace q3d::loaders {
 namespace {
@@ -36,11 +37,13 @@ bool is_token_char(char c) {
          c == '.';
 }
 
-bool is_no_json_number(const std::string& token) {
-  if (token == "NaN" || token == "Infinity" || token == "-Infinity") return true;
-  const bool may_overflow = token.size() > 300 || token.find_first_of("eE") != std::string::npos;
-  const bool is_number = token[0] == '-' || (token[0] >= '0' && token[0] <= '9');
-  return may_overflow && is_number && std::isinf(std::strtod(token.c_str(), nullptr));
+// Whether a bare word is a number that JSON cannot hold. Most words are short plain numbers, so the tests
+// that cost little come first.
+bool is_no_json_number(std::string_view word) {
+  if (word == "NaN" || word == "Infinity" || word == "-Infinity") return true;
+  const bool is_number = word[0] == '-' || (word[0] >= '0' && word[0] <= '9');
+  const bool may_overflow = word.size() > 300 || word.find_first_of("eE") != std::string_view::npos;
+  return is_number && may_overflow && std::isinf(std::strtod(std::string(word).c_str(), nullptr));
 }
 
 // Turns numbers that JSON cannot hold into texts of tildes of the same length, so that the rest of the file
@@ -55,9 +58,8 @@ void mask_numbers_beyond_json(std::string& text) {
     } else if (!in_string && is_token_char(text[i])) {
       std::size_t end = i;
       while (end < text.size() && is_token_char(text[end])) ++end;
-      const bool can_matter = end - i > 2 && (text[i] == 'N' || text[i] == 'I' || text[i] == '-' ||
-                                              end - i > 300 || text.find_first_of("eE", i) < end);
-      if (can_matter && is_no_json_number(text.substr(i, end - i))) {
+      const std::string_view word = std::string_view(text).substr(i, end - i);
+      if (word.size() > 2 && is_no_json_number(word)) {
         std::fill(text.begin() + static_cast<std::ptrdiff_t>(i),
                   text.begin() + static_cast<std::ptrdiff_t>(end), '~');
         text[i] = text[end - 1] = '"';
