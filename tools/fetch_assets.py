@@ -29,8 +29,12 @@ PRIMA, BIOCLIP = "MLAdaptiveIntelligence/PRIMA", "imageomics/bioclip"
 Say = Callable[[str], None]
 
 
-class Offline(Exception):
-    """The publisher cannot be reached."""
+class Unavailable(Exception):
+    """A file that cannot be downloaded now."""
+
+
+class Offline(Unavailable):
+    """The publisher cannot be reached, so other files need no try."""
 
 
 @dataclass(frozen=True)
@@ -107,9 +111,9 @@ class Store:
                     if self._download(asset.repository, name):
                         return self.path(name)
                 self.say(f"{asset.repository} has no file named {' or '.join(asset.names)}")
-            except Offline as error:
+            except Unavailable as error:
                 self.say(f"no download: {error}")
-                self.offline = True
+                self.offline = isinstance(error, Offline)
         if not optional:
             self.missing.append(asset)
         return None
@@ -145,9 +149,9 @@ class Store:
                     digest.update(chunk)
                     file.write(chunk)
             except (http.client.HTTPException, TimeoutError, ConnectionError) as error:
-                raise Offline(f"{name}: the connection broke after {file.tell()} bytes ({error})") from None
+                raise Unavailable(f"{name}: the connection broke after {file.tell()} bytes ({error})") from None
             if size and file.tell() != size:
-                raise Offline(f"{name}: the connection ended after {file.tell()} of {size} bytes")
+                raise Unavailable(f"{name}: the connection ended after {file.tell()} of {size} bytes")
             file.flush()
             os.fsync(file.fileno())
         return digest.hexdigest()
@@ -181,14 +185,14 @@ def _published_digest(repository: str, name: str) -> Optional[str]:
 
 
 def _open(url: str):
-    """The response, or None when there is no such file. Throws Offline."""
+    """The response, or None when there is no such file. Throws Unavailable."""
     request = urllib.request.Request(url, headers={"User-Agent": "quadruped3d-import-assets"})
     try:
         return urllib.request.urlopen(request, timeout=TIMEOUT_S)
     except urllib.error.HTTPError as error:
         if error.code == 404:
             return None
-        raise Offline(f"{url} answers {error.code} {error.reason}") from None
+        raise Unavailable(f"{url} answers {error.code} {error.reason}") from None
     except (urllib.error.URLError, OSError) as error:
         raise Offline(f"{url} cannot be reached ({getattr(error, 'reason', error)})") from None
 

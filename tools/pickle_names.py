@@ -31,17 +31,17 @@ class Global:
 # Modules that run programs or code, load them, or reach files and networks. No array, tensor or setting is made of
 # them, so their mere mention is refused.
 _PROGRAM_MODULES = frozenset(
-    "os posix nt subprocess popen2 pty sys importlib imp pkgutil runpy zipimport shutil socket ssl ctypes _ctypes "
-    "codeop pdb bdb timeit pickle cPickle _pickle dill cloudpickle joblib marshal operator _operator webbrowser "
-    "multiprocessing threading _thread atexit asyncio concurrent urllib urllib2 http httplib ftplib smtplib requests "
-    "httpx aiohttp io _io pip setuptools distutils ensurepip venv sqlite3".split()
+    "os posix nt subprocess commands popen2 pty sys importlib imp pkgutil runpy zipimport shutil socket ssl "
+    "ctypes _ctypes codeop pdb bdb timeit pickle cPickle _pickle dill cloudpickle joblib marshal operator "
+    "_operator webbrowser multiprocessing threading _thread atexit asyncio concurrent urllib urllib2 http httplib "
+    "ftplib smtplib requests httpx aiohttp io _io pip setuptools distutils ensurepip venv sqlite3".split()
 )
 
 # Of these modules, only what is plain data.
 _DATA_NAMES = {
     "builtins": frozenset(
         "object dict list tuple set frozenset int long float complex bool str unicode bytes bytearray range slice "
-        "getattr".split()
+        "xrange getattr".split()
     ),
     "types": frozenset(["SimpleNamespace", "NoneType"]),
     "copyreg": frozenset(["_reconstructor", "__newobj__"]),

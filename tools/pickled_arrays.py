@@ -70,7 +70,9 @@ def _dtype(value, what: str) -> np.dtype:
 
 
 def _bytes(value, what: str) -> bytes:
-    """Raw numbers: bytes, a Python 2 string, or text that Python 3 wrote as encode(text, 'latin1')."""
+    """Raw numbers: bytes, a Python 2 string, or, from Python 3 in protocol 2, encode(text, 'latin1') and bytes()."""
+    if isinstance(value, Record) and value.path == "builtins.bytes" and value.args == ():
+        return b""
     if isinstance(value, Record) and value.path in ("_codecs.encode", "codecs.encode") and len(value.args) == 2:
         text, encoding = value.args
         if isinstance(text, str) and encoding in ("latin1", "latin-1"):
@@ -100,8 +102,9 @@ def _reconstructed(record: Record, what: str) -> np.ndarray:
     state = record.state
     if cls != Global("numpy", "ndarray") or not isinstance(state, tuple) or len(state) not in (4, 5):
         raise BrokenPickle(f"{what} is no complete numpy array")
-    shape, dtype, fortran, raw = state[-4:]
-    return _shaped(_bytes(raw, what), _dtype(dtype, what), shape, bool(fortran), what)
+    shape, described, fortran, raw = state[-4:]
+    dtype = _dtype(described, what)
+    return _shaped(_bytes(raw, what), dtype, shape, bool(fortran), what)
 
 
 def _from_buffer(record: Record, what: str) -> np.ndarray:

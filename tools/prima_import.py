@@ -246,4 +246,5 @@ def _metadata(config: Mapping, source: str) -> dict[str, str]:
 def _fault_list(path: str, faults: list[str], advice: str) -> str:
     shown = "".join(f"\n  {fault[:300]}" for fault in faults[:_MAX_FAULTS_SHOWN])
     more = f"\n  ... and {len(faults) - _MAX_FAULTS_SHOWN} more" if len(faults) > _MAX_FAULTS_SHOWN else ""
-    return f"{path}: {len(faults)} tensors do not fit the network:{shown}{more}\n{advice}"
+    verb = "tensor does" if len(faults) == 1 else "tensors do"
+    return f"{path}: {len(faults)} {verb} not fit the network:{shown}{more}\n{advice}"

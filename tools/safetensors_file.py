@@ -89,10 +89,11 @@ def write(path: str, tensors: dict[str, Tensor], metadata: dict[str, str]) -> No
 
 
 def read(path: str) -> tuple[dict[str, Tensor], dict[str, str]]:
-    """The tensors, which keep the file open and read it when they are written, and the metadata. Throws
-    TensorFileError and OSError."""
+    """The tensors, which read the file again when they are written, and the metadata. Throws TensorFileError and
+    OSError."""
     try:
-        return _read(open(path, "rb"))
+        with open(path, "rb") as file:
+            return _read(file)
     except TensorFileError as error:
         raise TensorFileError(f"{path}: not a usable safetensors file: {error}") from None
 
@@ -114,7 +115,7 @@ def _read(file) -> tuple[dict[str, Tensor], dict[str, str]]:
     if not isinstance(metadata, dict) or not all(isinstance(value, str) for value in metadata.values()):
         raise TensorFileError("__metadata__ is not an object of strings")
     data_start, data_bytes = 8 + header_bytes, size - 8 - header_bytes
-    tensors = {name: _entry(file, data_start, data_bytes, name, entry) for name, entry in header.items()}
+    tensors = {name: _entry(file.name, data_start, data_bytes, name, entry) for name, entry in header.items()}
     reached = 0
     for begin, end in sorted(entry["data_offsets"] for entry in header.values()):
         if begin != reached:
@@ -125,7 +126,7 @@ def _read(file) -> tuple[dict[str, Tensor], dict[str, str]]:
     return tensors, metadata
 
 
-def _entry(file, data_start: int, data_bytes: int, name: str, entry: object) -> Tensor:
+def _entry(path: str, data_start: int, data_bytes: int, name: str, entry: object) -> Tensor:
     fields = entry if isinstance(entry, dict) else {}
     dtype, shape, offsets = (fields.get(key) for key in ("dtype", "shape", "data_offsets"))
     if not isinstance(dtype, str) or dtype not in ITEM_BYTES:
@@ -136,16 +137,18 @@ def _entry(file, data_start: int, data_bytes: int, name: str, entry: object) -> 
     if len(offsets) != 2 or not offsets[0] <= offsets[1] <= data_bytes:
         raise TensorFileError(f"{name}: data_offsets {offsets} outside the {data_bytes} bytes of data (truncated?)")
     start, end = data_start + offsets[0], data_start + offsets[1]
-    tensor = Tensor(dtype, tuple(shape), lambda: _pieces(file, start, end))
+    tensor = Tensor(dtype, tuple(shape), lambda: _pieces(path, start, end))
     if end - start != tensor.byte_count:
         raise TensorFileError(f"{name}: {end - start} bytes, expected {tensor.byte_count} from its shape and dtype")
     return tensor
 
 
-def _pieces(file, start: int, end: int) -> Iterator[bytes]:
-    while start < end:
-        piece = os.pread(file.fileno(), min(CHUNK_BYTES, end - start), start)
-        if not piece:
-            raise TensorFileError(f"{file.name}: ends at byte {start} while it is being read, expected {end}")
-        start += len(piece)
-        yield piece
+def _pieces(path: str, start: int, end: int) -> Iterator[bytes]:
+    with open(path, "rb", buffering=0) as file:
+        file.seek(start)
+        while start < end:
+            piece = file.read(min(CHUNK_BYTES, end - start))
+            if not piece:
+                raise TensorFileError(f"{path}: ends at byte {start} while it is being read, expected {end}")
+            start += len(piece)
+            yield piece
