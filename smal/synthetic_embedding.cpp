@@ -65,8 +65,9 @@ void place_tube(const QuadrupedMesh& mesh, const Tube& tube, const Anatomy& anat
   for (std::size_t r = 0; r < rings.size(); ++r) {
     const TubeRing& ring = profile.rings[r];
     for (std::size_t side = 0; side < rings[r].size(); ++side) {
+      const double c = std::cos(angles[side]);
       points.row(rings[r][side]) =
-          ring.center + std::cos(angles[side]) * ring.across + std::sin(angles[side]) * ring.along;
+          ring.center + c * ring.across + (std::sin(angles[side]) + ring.level * c * c) * ring.along;
     }
   }
   points.row(mesh.pole_of(tube.part)) = profile.pole;
