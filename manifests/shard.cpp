@@ -188,8 +188,8 @@ ShardReader::ShardReader(const std::filesystem::path& path) : table_(check_ident
 
 std::vector<ShardSample> ShardReader::samples(std::int64_t first, std::int64_t count) const {
   if (first < 0 || count < 0 || first > rows() || count > rows() - first) {
-    throw std::out_of_range(fmt::format("{}: rows {} to {}, but there are {}", table_.path().string(), first,
-                                        first + count, rows()));
+    throw std::out_of_range(fmt::format("{}: {} rows from {} on, but there are {}", table_.path().string(),
+                                        count, first, rows()));
   }
   std::vector<ShardSample> samples(static_cast<std::size_t>(count));
   if (samples.empty()) return samples;
