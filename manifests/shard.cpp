@@ -20,7 +20,7 @@ bool is_image_encoding(std::string_view name) {
   return std::find(kImageEncodings.begin(), kImageEncodings.end(), name) != kImageEncodings.end();
 }
 
-// What a reader without this document needs to know about each column.
+// What a reader without docs/shard-format.md needs to know about each column.
 std::string describe_columns() {
   nlohmann::json columns;
   for (const ShardColumn& column : shard_columns()) {
