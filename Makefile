@@ -5,7 +5,7 @@ OUT    ?= out
 CONFIG ?=
 JOBS   ?= $(shell nproc)
 
-.PHONY: quadruped3d test build setup configure sample format bench asan clean help
+.PHONY: quadruped3d test build setup configure assets sample format bench asan clean help
 
 quadruped3d: build  ## build the dataset that CONFIG describes (default: the rendered sample world)
 	tools/quadruped3d.sh $(OUT) $(CONFIG)
@@ -19,6 +19,9 @@ build: $(BUILD)/build.ninja  ## compile (release unless PRESET says otherwise)
 
 setup:  ## install Debian packages and LibTorch where they are missing
 	@tools/setup.sh
+
+assets: setup  ## fetch the official weights and body where there is a network, verify and import them
+	@.venv/bin/python tools/import_assets.py fetch
 
 $(BUILD)/build.ninja: | setup
 	cmake --preset $(PRESET) $(CMAKE_ARGS)

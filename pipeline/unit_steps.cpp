@@ -64,9 +64,9 @@ DecodedSample decode_sample(const manifests::SampleRecord& record, Wanted want, 
     sample.detail = image.detail;
     return sample;
   }
-  const loaders::DecodedImage mask = loaders::decode_mask(record.mask_path);
-  const bool has_mask = mask.failure == Reason::none && mask.rgb.size() == image.rgb.size();
-  const cv::Mat silhouette = has_mask ? mask.rgb : cv::Mat();
+  // A mask that is absent, unreadable or no silhouette leaves the sample without one.
+  const cv::Mat silhouette = loaders::decode_mask(record.mask_path).silhouette;
+  const bool has_mask = silhouette.size() == image.rgb.size();
   sample.image_width_px = image.rgb.cols;
   sample.image_height_px = image.rgb.rows;
   sample.has_mask = has_mask;
@@ -83,7 +83,7 @@ DecodedSample decode_sample(const manifests::SampleRecord& record, Wanted want, 
     const cv::Mat patch = loaders::make_patch(image.rgb, cv::Mat(), square).rgb;
     sample.patch.assign(patch.datastart, patch.dataend);
   }
-  if (want.stored_crop) store_crop(sample, image.rgb, silhouette, square, shards);
+  if (want.stored_crop) store_crop(sample, image.rgb, has_mask ? silhouette : cv::Mat(), square, shards);
   sample.decoded = true;
   return sample;
 }
