@@ -173,7 +173,11 @@ bool PictureFinder::is_allowed(const fs::path& resolved) const {
 
 std::string id_part(std::string_view name) {
   const fs::path normal = fs::path(name).lexically_normal();
-  return normal.is_absolute() || climbs_out(normal) ? normal.filename().string() : normal.generic_string();
+  std::string part =
+      normal.is_absolute() || climbs_out(normal) ? normal.filename().string() : normal.generic_string();
+  std::replace_if(
+      part.begin(), part.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '_');
+  return part;
 }
 
 }  // namespace q3d::loaders
