@@ -149,8 +149,9 @@ std::optional<FoundPicture> PictureFinder::existing(const fs::path& path) {
   fs::path resolved;
   if (fs::is_symlink(own)) {
     resolved = fs::canonical(path, error);
-    if (error)
+    if (error) {
       return FoundPicture{{}, Reason::image_missing, fmt::format("{}, a link to nothing", path.string())};
+    }
     if (fs::is_directory(resolved, error)) return std::nullopt;
   } else {
     // Most pictures share few folders: resolving each folder once saves a system call a component.
