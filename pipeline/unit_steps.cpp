@@ -10,6 +10,7 @@
 #include "loaders/crop.h"
 #include "loaders/encode.h"
 #include "loaders/image.h"
+#include "loaders/stored_crop.h"
 #include "pipeline/interrupt.h"
 
 namespace q3d::pipeline {
@@ -37,7 +38,7 @@ void store_crop(DecodedSample& sample, const cv::Mat& rgb, const cv::Mat& mask, 
                 const ShardConfig& shards) {
   const loaders::StoredCrop crop =
       loaders::make_stored_crop(rgb, mask, box, shards.crop_scale, shards.crop_min_side_px);
-  sample.stored_side_px = crop.side_px;
+  sample.stored_side_px = crop.rgb.cols;
   sample.stored_from_image = crop.from_image;
   if (shards.images == "reference") return;
   sample.stored_crop = shards.images == "png" ? loaders::encode_png(crop.rgb)
@@ -63,9 +64,9 @@ DecodedSample decode_sample(const manifests::SampleRecord& record, Wanted want, 
     sample.detail = image.detail;
     return sample;
   }
-  const loaders::DecodedImage mask = loaders::decode_mask(record.mask_path);
-  const bool has_mask = mask.failure == Reason::none && mask.rgb.size() == image.rgb.size();
-  const cv::Mat silhouette = has_mask ? mask.rgb : cv::Mat();
+  // A mask that is absent, unreadable or no silhouette leaves the sample without one.
+  const cv::Mat silhouette = loaders::decode_mask(record.mask_path).silhouette;
+  const bool has_mask = silhouette.size() == image.rgb.size();
   sample.image_width_px = image.rgb.cols;
   sample.image_height_px = image.rgb.rows;
   sample.has_mask = has_mask;
@@ -82,7 +83,7 @@ DecodedSample decode_sample(const manifests::SampleRecord& record, Wanted want, 
     const cv::Mat patch = loaders::make_patch(image.rgb, cv::Mat(), square).rgb;
     sample.patch.assign(patch.datastart, patch.dataend);
   }
-  if (want.stored_crop) store_crop(sample, image.rgb, silhouette, square, shards);
+  if (want.stored_crop) store_crop(sample, image.rgb, has_mask ? silhouette : cv::Mat(), square, shards);
   sample.decoded = true;
   return sample;
 }
