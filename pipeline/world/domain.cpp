@@ -13,7 +13,7 @@ Domain animal3d() {
   d.frequency = &Frequency::animal3d;
   d.stance = {.extreme = 0.03, .resting = 0.12, .spread = 1.0};
   d.side_view = 0.65;
-  d.framing = {.fill_low = 0.55, .fill_high = 0.95, .truncated = 0.08, .box_bias = 1.01, .box_spread = 0.015};
+  d.framing = {.fill_low = 0.62, .fill_high = 0.97, .truncated = 0.08, .box_bias = 1.01, .box_spread = 0.015};
   d.sizes = {{1.0, 0.75}, {1.0, 0.75}, {1.0, 0.667}, {0.75, 1.0}, {1.0, 1.0}};
   d.places = {30, 18, 12, 6, 6, 8, 14, 6, 0};
   d.sunny = 0.6;
@@ -59,7 +59,7 @@ Domain superanimal() {
   d.side_view = 0.45;
   d.camera_high_deg = 9.0;
   d.camera_high_spread_deg = 10.0;
-  d.framing = {.fill_low = 0.4, .fill_high = 0.98, .truncated = 0.14, .box_bias = 1.02, .box_spread = 0.03};
+  d.framing = {.fill_low = 0.45, .fill_high = 0.98, .truncated = 0.12, .box_bias = 1.02, .box_spread = 0.03};
   d.sizes = {{1.0, 0.75}, {1.0, 0.667}, {0.667, 1.0}, {1.0, 1.0}, {1.0, 0.5625}};
   d.places = {24, 14, 12, 8, 6, 10, 14, 12, 0};
   d.sunny = 0.5;

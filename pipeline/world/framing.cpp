@@ -75,9 +75,9 @@ Placement draw_placement(double aspect, cv::Size picture_px, const FramingHabits
   };
   Placement placement{side, {centre(width, picture_px.width), centre(height, picture_px.height)}};
   if (rng.chance(habits.truncated)) {
-    placement.side_px *= rng.uniform(1.0, 1.5);
-    // Push it over one border, by up to two fifths of its own size.
-    const double over = rng.uniform(0.1, 0.4) * placement.side_px;
+    placement.side_px *= rng.uniform(1.0, 1.4);
+    // Push it over one border, by up to a third of its own size.
+    const double over = rng.uniform(0.08, 0.33) * placement.side_px;
     const double half_w = 0.5 * width * placement.side_px / side, half_h = 0.5 * height * placement.side_px / side;
     switch (rng.below(5)) {
       case 0: case 1: placement.centre_px.x = half_w - over; break;
