@@ -105,6 +105,7 @@ class SurfacePlaces {
  public:
   explicit SurfacePlaces(const RestMesh& rest) : rest_(rest) {
     for (std::size_t k = 0; k < keypoints_.size(); ++k) {
+      keypoints_[k].setZero();
       for (const int vertex : rest.keypoint_vertices[k]) {
         keypoints_[k] += rest.vertices[static_cast<std::size_t>(vertex)];
       }
@@ -214,7 +215,7 @@ class SurfacePlaces {
   }
 
   const RestMesh& rest_;
-  std::array<Eigen::Vector3f, kBodyKeypoints> keypoints_{};
+  std::array<Eigen::Vector3f, kBodyKeypoints> keypoints_;
   std::map<std::string, int> vertex_;
 };
 

@@ -22,7 +22,13 @@ constexpr double kShare = 0.02;
 constexpr int kPixels = 128;
 
 WorldOptions options_for(const fs::path& out, int threads) {
-  return {.out = out, .seed = 7, .picture_px = kPixels, .share = kShare, .threads = threads};
+  WorldOptions options;
+  options.out = out;
+  options.seed = 7;
+  options.picture_px = kPixels;
+  options.share = kShare;
+  options.threads = threads;
+  return options;
 }
 
 json read_json(const fs::path& path) { return json::parse(manifests::read_file(path)); }
@@ -73,9 +79,8 @@ TEST_F(WorldFiles, AnotherSeedGivesOtherPictures) {
   other.share = 0.002;
   const auto first = make_world(other);
   EXPECT_LT(first.total, summary_->total);
-  const auto a = read_json(out() / "animal3d/train.json")["data"][0];
-  const auto b = read_json(other.out / "animal3d/train.json")["data"][0];
-  EXPECT_NE(a["pose"], b["pose"]);
+  const json a = read_json(out() / "animal3d/train.json"), b = read_json(other.out / "animal3d/train.json");
+  EXPECT_NE(a["data"][0]["pose"], b["data"][0]["pose"]);
 }
 
 TEST_F(WorldFiles, AFinishedWorldIsKeptAndOtherFoldersAreLeftAlone) {
@@ -138,7 +143,8 @@ TEST_F(WorldFiles, TruthProjectsBackOntoTheAnnotation) {
     const bool exact = folder != "animal3d";
     double noise = 0.0;
     int labelled = 0;
-    for (const json& record : read_json(out() / folder / "train.json")["data"]) {
+    const json file = read_json(out() / folder / "train.json");
+    for (const json& record : file["data"]) {
       for (std::size_t k = 0; k < 26; ++k) {
         const auto [x, y] = projected(record["keypoint_3d"][k], record["trans"], record["bbox"]);
         EXPECT_NEAR(record["reproj_kp_2d"][k][0].get<double>(), x, 0.05);
@@ -146,13 +152,17 @@ TEST_F(WorldFiles, TruthProjectsBackOntoTheAnnotation) {
         if (record["keypoint_2d"][k][2] == 0.0) continue;
         const double off = std::hypot(record["keypoint_2d"][k][0].get<double>() - x,
                                       record["keypoint_2d"][k][1].get<double>() - y);
-        if (exact) EXPECT_LT(off, 0.5) << record["img_path"] << " keypoint " << k;
+        if (exact) {
+          EXPECT_LT(off, 0.5) << record["img_path"] << " keypoint " << k;
+        }
         noise += off;
         ++labelled;
       }
     }
     ASSERT_GT(labelled, 0);
-    if (!exact) EXPECT_GT(noise / labelled, 0.2) << "people do not label this exactly";
+    if (!exact) {
+      EXPECT_GT(noise / labelled, 0.2) << "people do not label this exactly";
+    }
   }
 }
 
@@ -187,13 +197,17 @@ TEST_F(WorldFiles, MasksShowTheAnimalInsideItsPicture) {
     EXPECT_GT(cv::countNonZero(mask(box & cv::Rect({0, 0}, mask.size()))), 0.9 * area) << mask_path;
   };
   for (const std::string folder : {"animal3d", "control_animal3dlatest"}) {
-    for (const json& record : read_json(out() / folder / "test.json")["data"]) {
+    const json file = read_json(out() / folder / "test.json");
+    ASSERT_EQ(file["data"].size(), 10U);
+    for (const json& record : file["data"]) {
       const fs::path root = out() / folder;
       look(root / record["img_path"].get<std::string>(), root / record["mask_path"].get<std::string>(), record["bbox"]);
       EXPECT_EQ(cv::imread((root / record["img_path"].get<std::string>()).string()).cols, record["width"]);
     }
   }
-  for (const auto& [name, record] : read_json(out() / "truth/superanimal_quadruped_test.json")["pictures"].items()) {
+  const json truth = read_json(out() / "truth/superanimal_quadruped_test.json");
+  ASSERT_EQ(truth["pictures"].size(), 12U);
+  for (const auto& [name, record] : truth["pictures"].items()) {
     const std::string base = name.substr(name.rfind('/') + 1);
     look(out() / "superanimal_quadruped/images" / base, out() / record["mask_path"].get<std::string>(), record["bbox"]);
   }
@@ -214,7 +228,7 @@ TEST_F(WorldFiles, SuperAnimalHasItsQuirks) {
       zeros = zeros || (v == 0.0 && x == 0.0);
       minus_ones = minus_ones || (v == -1.0 && x == -1.0);
       EXPECT_TRUE(v == -1.0 || v == 0.0 || v == 1.0 || v == 2.0);
-      if (v > 0.0) EXPECT_GE(x, 0.0);
+      EXPECT_TRUE(v <= 0.0 || x >= 0.0);
     }
     for (const std::size_t antler : {8U, 9U, 13U, 14U}) EXPECT_EQ(annotation["keypoints"][3 * antler + 2], -1);
   }
@@ -222,7 +236,9 @@ TEST_F(WorldFiles, SuperAnimalHasItsQuirks) {
 }
 
 TEST_F(WorldFiles, AnimalKingdomBoxesAreTight) {
-  for (const json& record : read_json(out() / "animal_kingdom/annotation/ak_P3_mammal/test.json")) {
+  const json records = read_json(out() / "animal_kingdom/annotation/ak_P3_mammal/test.json");
+  ASSERT_EQ(records.size(), 10U);
+  for (const json& record : records) {
     ASSERT_EQ(record["joints"].size(), 23U);
     double left = 1e9, right = -1e9, top = 1e9, bottom = -1e9;
     for (std::size_t k = 0; k < 23; ++k) {
