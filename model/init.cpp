@@ -1,5 +1,6 @@
-// Fresh weights. Only uniform draws from a counter-based generator are used, so that a seed gives the same bytes
-// on every machine: library normal distributions go through vectorised logarithms that differ between CPUs.
+// Fresh weights. Only uniform draws from a counter-based generator are used, so that a seed gives the same
+// bytes on every machine: library normal distributions go through vectorised logarithms that differ between
+// CPUs.
 #include <cmath>
 #include <string_view>
 
@@ -37,7 +38,9 @@ bool ends_with(std::string_view name, std::string_view end) {
   return name.size() >= end.size() && name.substr(name.size() - end.size()) == end;
 }
 
-bool contains(std::string_view name, std::string_view part) { return name.find(part) != std::string_view::npos; }
+bool contains(std::string_view name, std::string_view part) {
+  return name.find(part) != std::string_view::npos;
+}
 
 bool is_layer_norm(std::string_view name) {
   return contains(name, "norm") || contains(name, ".ln_") || contains(name, "projection.1.") ||
@@ -76,8 +79,8 @@ torch::Tensor initial_tensor(const TensorSpec& spec, std::uint64_t seed) {
 
 }  // namespace
 
-void write_initial_checkpoint(const std::filesystem::path& path, const PrimaConfig& config, std::uint64_t seed,
-                              torch::ScalarType dtype) {
+void write_initial_checkpoint(const std::filesystem::path& path, const PrimaConfig& config,
+                              std::uint64_t seed, torch::ScalarType dtype) {
   smal::NamedTensors tensors;
   for (const TensorSpec& spec : expected_tensors(config)) {
     tensors.emplace_back(spec.name, initial_tensor(spec, seed).to(dtype));

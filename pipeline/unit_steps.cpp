@@ -65,11 +65,13 @@ DecodedSample decode_sample(const manifests::SampleRecord& record, Wanted want, 
     sample.detail = image.detail;
     return sample;
   }
-  // A mask that is absent, unreadable or no silhouette leaves the sample without one; the latter two are told.
+  // A mask that is absent, unreadable or no silhouette leaves the sample without one; the latter two are
+  // told.
   const loaders::DecodedMask mask = loaders::decode_mask(record.mask_path);
   const bool has_mask = mask.silhouette.size() == image.rgb.size();
   if (!has_mask && mask.kind != loaders::MaskKind::absent) {
-    sample.detail = "the mask is left out: " + (mask.detail.empty() ? "it is not of the picture's size" : mask.detail);
+    sample.detail =
+        "the mask is left out: " + (mask.detail.empty() ? "it is not of the picture's size" : mask.detail);
   }
   sample.image_width_px = image.rgb.cols;
   sample.image_height_px = image.rgb.rows;

@@ -14,8 +14,17 @@ constexpr double kFarthest = 3.0;    // of a species from its family, in those o
 
 // SMAL keypoints that end the measured parts.
 enum Keypoint {
-  left_eye = 0, left_front_paw = 3, left_back_paw = 5, tail_base = 7, left_front_thigh = 8, left_back_thigh = 10,
-  left_shoulder = 12, right_shoulder = 13, neck = 18, tail_tip = 19, nose = 24
+  left_eye = 0,
+  left_front_paw = 3,
+  left_back_paw = 5,
+  tail_base = 7,
+  left_front_thigh = 8,
+  left_back_thigh = 10,
+  left_shoulder = 12,
+  right_shoulder = 13,
+  neck = 18,
+  tail_tip = 19,
+  nose = 24
 };
 
 // One wanted change for each of ShapeSpace's lengths, in the same order.
@@ -26,7 +35,8 @@ Eigen::VectorXd wanted_changes(const Build& build) {
 }
 
 int vertex_of(const std::vector<Landmark>& landmarks, const char* name) {
-  return std::find_if(landmarks.begin(), landmarks.end(), [&](const Landmark& l) { return l.name == name; })->vertex;
+  return std::find_if(landmarks.begin(), landmarks.end(), [&](const Landmark& l) { return l.name == name; })
+      ->vertex;
 }
 
 // Where the ear grows out of the head: its vertex nearest to the eye.

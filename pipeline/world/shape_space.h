@@ -13,13 +13,13 @@ namespace q3d::pipeline::world {
 
 class ShapeSpace {
  public:
-  // shape_directions (3 V, 41): row 3 vertex + xyz; family_means (5, 41); family_factors: one (measures, 41) a
-  // family, the betas of one standard deviation of each independent measure of its animals.
+  // shape_directions (3 V, 41): row 3 vertex + xyz; family_means (5, 41); family_factors: one (measures, 41)
+  // a family, the betas of one standard deviation of each independent measure of its animals.
   ShapeSpace(const RestMesh& rest, Eigen::MatrixXd shape_directions, Eigen::MatrixXd family_means,
              std::vector<Eigen::MatrixXd> family_factors);
 
-  // The middle of a species: its family's mean and the likeliest change of the measures that gives its build, to
-  // first order. No measure moves by more than three deviations.
+  // The middle of a species: its family's mean and the likeliest change of the measures that gives its build,
+  // to first order. No measure moves by more than three deviations.
   Eigen::VectorXd typical(const Species& species) const;
 
   // An individual: about the typical one, at half the family's deviations.

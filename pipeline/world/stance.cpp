@@ -18,11 +18,13 @@ constexpr int kForeLegs[] = {7, 11};
 constexpr int kHindLegs[] = {17, 21};
 constexpr int kLegJoints = 4;
 
-bool is_leg(int joint) { return (joint >= 7 && joint < 15) || (joint >= 17 && joint < 25); }
+bool is_leg(int joint) {
+  return (joint >= 7 && joint < 15) || (joint >= 17 && joint < 25);
+}
 
-// At rest all joints share the body's axes (x to the head, y up, z to the right), so that a positive turn about z
-// swings a leg forwards and lifts the head, one about y turns the head to the left, one about x leans to the
-// right.
+// At rest all joints share the body's axes (x to the head, y up, z to the right), so that a positive turn
+// about z swings a leg forwards and lifts the head, one about y turns the head to the left, one about x leans
+// to the right.
 class Posing {
  public:
   Posing(Stance& stance, Rng& rng) : stance_(stance), rng_(rng) {}
@@ -116,10 +118,14 @@ void bow(Stance& stance, Posing& posing) {
 
 void extreme(Stance& stance, Posing& posing, Rng& rng) {
   switch (rng.below(4)) {
-    case 0: return rear(stance, posing);
-    case 1: return leap(stance, posing, rng);
-    case 2: return roll_over(stance, posing, rng);
-    default: return bow(stance, posing);
+    case 0:
+      return rear(stance, posing);
+    case 1:
+      return leap(stance, posing, rng);
+    case 2:
+      return roll_over(stance, posing, rng);
+    default:
+      return bow(stance, posing);
   }
 }
 

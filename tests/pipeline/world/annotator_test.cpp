@@ -22,7 +22,8 @@ std::vector<SeenLandmark> in_the_open() {
 }
 
 TEST(Annotate, LabelsAtTheRateOfWhatCanBeSeen) {
-  const LabelHabits habits{.visible = 0.9, .self_hidden = 0.5, .occluded = 0.2, .swapped = 0.0, .jitter = 0.0};
+  const LabelHabits habits{
+      .visible = 0.9, .self_hidden = 0.5, .occluded = 0.2, .swapped = 0.0, .jitter = 0.0};
   auto seen = in_the_open();
   seen[1].self_hidden = true;
   seen[2].occluded = true;

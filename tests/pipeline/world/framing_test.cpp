@@ -46,7 +46,8 @@ TEST(FitTranslation, PutsTheBoundingBoxWhereItIsWanted) {
 
 TEST(FrameAnimal, ABoxWithoutErrorIsTheSilhouettesBoundingBox) {
   const auto corners = box_of_corners(0.9F, 0.6F, 0.3F);
-  const FramingHabits exact{.fill_low = 0.5, .fill_high = 0.9, .truncated = 0.0, .box_bias = 1.0, .box_spread = 0.0};
+  const FramingHabits exact{
+      .fill_low = 0.5, .fill_high = 0.9, .truncated = 0.0, .box_bias = 1.0, .box_spread = 0.0};
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     Rng rng(seed);
     const Framing framing = frame_animal(corners, {320, 240}, exact, rng);
@@ -67,7 +68,8 @@ TEST(FrameAnimal, ABoxWithoutErrorIsTheSilhouettesBoundingBox) {
 
 TEST(FrameAnimal, ATruncatedAnimalsBoxStaysInsideThePicture) {
   const auto corners = box_of_corners(0.9F, 0.6F, 0.3F);
-  const FramingHabits cut{.fill_low = 0.8, .fill_high = 1.1, .truncated = 1.0, .box_bias = 1.03, .box_spread = 0.03};
+  const FramingHabits cut{
+      .fill_low = 0.8, .fill_high = 1.1, .truncated = 1.0, .box_bias = 1.03, .box_spread = 0.03};
   int at_border = 0;
   for (std::uint64_t seed = 0; seed < 40; ++seed) {
     Rng rng(seed);

@@ -38,18 +38,21 @@ TEST_F(Landmarks, NamesMirrorsAndMapsAgreeWithTheLoaders) {
 
 TEST_F(Landmarks, MirrorPartnersLieOnOppositeSidesOfTheRestingBody) {
   const RestMesh& rest = model().rest();
-  for (const auto& set : {animal3d_landmarks(rest), superanimal_landmarks(rest), animal_kingdom_landmarks(rest)}) {
+  for (const auto& set :
+       {animal3d_landmarks(rest), superanimal_landmarks(rest), animal_kingdom_landmarks(rest)}) {
     Body body;
     body.vertices = rest.vertices;
     for (std::size_t k = 0; k < body.keypoints.size(); ++k) {
       body.keypoints[k].setZero();
-      for (const int v : rest.keypoint_vertices[k]) body.keypoints[k] += rest.vertices[static_cast<std::size_t>(v)];
+      for (const int v : rest.keypoint_vertices[k])
+        body.keypoints[k] += rest.vertices[static_cast<std::size_t>(v)];
       body.keypoints[k] /= static_cast<float>(rest.keypoint_vertices[k].size());
     }
     const auto points = landmark_points(set, body);
     for (std::size_t i = 0; i < set.size(); ++i) {
       const Eigen::Vector3f& partner = points[static_cast<std::size_t>(set[i].mirror)];
-      EXPECT_LT((points[i] - Eigen::Vector3f(partner.x(), partner.y(), -partner.z())).norm(), 0.05F) << set[i].name;
+      EXPECT_LT((points[i] - Eigen::Vector3f(partner.x(), partner.y(), -partner.z())).norm(), 0.05F)
+          << set[i].name;
       const bool right = set[i].name.find("ight") != std::string::npos;  // z is the animal's right
       EXPECT_TRUE(!right || !set[i].exists() || points[i].z() > 0.005F) << set[i].name;
     }

@@ -26,8 +26,8 @@ std::map<int, int> species_counts(const std::vector<PicturePlan>& plans) {
 
 TEST(PlanSplit, Animal3dHasALongTailOfThirtyNineToOne) {
   const auto counts = species_counts(plan_split(SetId::animal3d, false, 4.0, 1));
-  const auto [least, most] = std::minmax_element(counts.begin(), counts.end(),
-                                                 [](const auto& a, const auto& b) { return a.second < b.second; });
+  const auto [least, most] = std::minmax_element(
+      counts.begin(), counts.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
   EXPECT_NEAR(static_cast<double>(most->second) / least->second, 39.0, 4.0);
   EXPECT_EQ(species_table()[static_cast<std::size_t>(most->first)].name, "horse");
   EXPECT_EQ(species_table()[static_cast<std::size_t>(least->first)].name, "cougar");

@@ -38,8 +38,8 @@ TEST_F(TwoSquares, NearestFindsTheFrontSquareAndItsBarycentricPlace) {
   for (const std::size_t i : {std::size_t{3}, std::size_t{18}}) {
     ASSERT_LT(hits[i].triangle, 2U);
     const Triangle& t = triangles_[hits[i].triangle];
-    const Eigen::Vector3f place = (1.0F - hits[i].u - hits[i].v) * corners_[t[0]] + hits[i].u * corners_[t[1]] +
-                                  hits[i].v * corners_[t[2]];
+    const Eigen::Vector3f place = (1.0F - hits[i].u - hits[i].v) * corners_[t[0]] +
+                                  hits[i].u * corners_[t[1]] + hits[i].v * corners_[t[2]];
     EXPECT_LT((place - hits[i].distance * rays[i]).norm(), 1e-5F);
   }
   EXPECT_FLOAT_EQ(hits[3].distance, 4.0F);

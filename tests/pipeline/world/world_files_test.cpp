@@ -31,7 +31,9 @@ WorldOptions options_for(const fs::path& out, int threads) {
   return options;
 }
 
-json read_json(const fs::path& path) { return json::parse(manifests::read_file(path)); }
+json read_json(const fs::path& path) {
+  return json::parse(manifests::read_file(path));
+}
 
 class WorldFiles : public ::testing::Test {
  protected:
@@ -167,7 +169,8 @@ TEST_F(WorldFiles, TruthProjectsBackOntoTheAnnotation) {
 }
 
 TEST_F(WorldFiles, HiddenTruthProjectsBackThroughItsOwnCamera) {
-  for (const std::string file : {"superanimal_quadruped_train", "superanimal_quadruped_test", "animal_kingdom_test"}) {
+  for (const std::string file :
+       {"superanimal_quadruped_train", "superanimal_quadruped_test", "animal_kingdom_test"}) {
     const json truth = read_json(out() / "truth" / (file + ".json"))["pictures"];
     ASSERT_FALSE(truth.empty());
     for (const auto& [name, record] : truth.items()) {
@@ -201,7 +204,8 @@ TEST_F(WorldFiles, MasksShowTheAnimalInsideItsPicture) {
     ASSERT_EQ(file["data"].size(), 10U);
     for (const json& record : file["data"]) {
       const fs::path root = out() / folder;
-      look(root / record["img_path"].get<std::string>(), root / record["mask_path"].get<std::string>(), record["bbox"]);
+      look(root / record["img_path"].get<std::string>(), root / record["mask_path"].get<std::string>(),
+           record["bbox"]);
       EXPECT_EQ(cv::imread((root / record["img_path"].get<std::string>()).string()).cols, record["width"]);
     }
   }
@@ -209,7 +213,8 @@ TEST_F(WorldFiles, MasksShowTheAnimalInsideItsPicture) {
   ASSERT_EQ(truth["pictures"].size(), 12U);
   for (const auto& [name, record] : truth["pictures"].items()) {
     const std::string base = name.substr(name.rfind('/') + 1);
-    look(out() / "superanimal_quadruped/images" / base, out() / record["mask_path"].get<std::string>(), record["bbox"]);
+    look(out() / "superanimal_quadruped/images" / base, out() / record["mask_path"].get<std::string>(),
+         record["bbox"]);
   }
 }
 
@@ -230,7 +235,8 @@ TEST_F(WorldFiles, SuperAnimalHasItsQuirks) {
       EXPECT_TRUE(v == -1.0 || v == 0.0 || v == 1.0 || v == 2.0);
       EXPECT_TRUE(v <= 0.0 || x >= 0.0);
     }
-    for (const std::size_t antler : {8U, 9U, 13U, 14U}) EXPECT_EQ(annotation["keypoints"][3 * antler + 2], -1);
+    for (const std::size_t antler : {8U, 9U, 13U, 14U})
+      EXPECT_EQ(annotation["keypoints"][3 * antler + 2], -1);
   }
   EXPECT_TRUE(zeros && minus_ones) << "both codes of a missing point occur";
 }
@@ -247,7 +253,8 @@ TEST_F(WorldFiles, AnimalKingdomBoxesAreTight) {
         EXPECT_EQ(x, -1.0);
         continue;
       }
-      left = std::min(left, x), right = std::max(right, x), top = std::min(top, y), bottom = std::max(bottom, y);
+      left = std::min(left, x), right = std::max(right, x), top = std::min(top, y),
+      bottom = std::max(bottom, y);
     }
     if (right <= left && bottom <= top) continue;
     EXPECT_NEAR(record["scale"].get<double>() * 200.0, std::max(right - left, bottom - top), 1e-6);
@@ -260,9 +267,10 @@ TEST_F(WorldFiles, LoadersReadEveryRecord) {
       {"a", "prima", "train", out() / "animal3d", "train.json", {}},
       {"c", "prima", "test", out() / "control_animal3dlatest", "test.json", {}},
       {"s", "superanimal", "train", out() / "superanimal_quadruped", "annotations/train.json", "images"},
-      {"k", "animal_kingdom", "test", out() / "animal_kingdom", "annotation/ak_P3_mammal/test.json", "dataset"}};
-  const std::vector<std::string> names{"animal3d/train", "control_animal3dlatest/test", "superanimal_quadruped/train",
-                                       "animal_kingdom/test"};
+      {"k", "animal_kingdom", "test", out() / "animal_kingdom", "annotation/ak_P3_mammal/test.json",
+       "dataset"}};
+  const std::vector<std::string> names{"animal3d/train", "control_animal3dlatest/test",
+                                       "superanimal_quadruped/train", "animal_kingdom/test"};
   for (std::size_t i = 0; i < sets.size(); ++i) {
     const loaders::Dataset dataset = loaders::load_dataset(sets[i]);
     EXPECT_EQ(static_cast<int>(dataset.records.size()), summary_->pictures.at(names[i]));
