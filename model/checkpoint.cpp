@@ -133,7 +133,7 @@ std::shared_ptr<PrimaNet> load_net(const smal::SafeTensors& file, const PrimaCon
   const PrimaNet plan(config, {torch::kMeta, placement.matrix_dtype});
   if (const auto faults = find_faults(file, plan, asset); !faults.empty()) {
     std::string message =
-        fmt::format("{}: {} tensors do not fit the network:", file.path().string(), faults.size());
+        fmt::format("{}: {} faults keep it from fitting the network:", file.path().string(), faults.size());
     for (const std::string& fault : faults) message += "\n  " + fault;
     throw std::runtime_error(message);
   }

@@ -84,7 +84,7 @@ TEST_F(Checkpoint, EveryFaultIsNamedAtOnce) {
   tensors_["backbone.last_norm.bias"] = torch::zeros({config_.embed_dim}, torch::kInt32);
   const std::string message = refusal(tensors_);
   EXPECT_TRUE(mentions(message, "changed.safetensors")) << message;
-  EXPECT_TRUE(mentions(message, "5 tensors")) << message;
+  EXPECT_TRUE(mentions(message, "5 faults")) << message;
   EXPECT_TRUE(mentions(message, "backbone.cls_token: missing")) << message;
   EXPECT_TRUE(mentions(message, "smal_head.decpose.2.bias: missing")) << message;
   EXPECT_TRUE(mentions(message, "smal_head.stray: not part")) << message;
