@@ -5,7 +5,7 @@ OUT    ?= out
 CONFIG ?=
 JOBS   ?= $(shell nproc)
 
-.PHONY: quadruped3d test program build setup configure assets sample format bench asan clean help
+.PHONY: quadruped3d test program build setup assets format bench asan clean help
 
 quadruped3d: program  ## build the dataset that CONFIG describes (default: the rendered sample world)
 	tools/quadruped3d.sh $(OUT) $(CONFIG)
