@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <fstream>
 #include <stdexcept>
+#include <string_view>
 
 namespace q3d::loaders {
 namespace {
@@ -36,11 +37,13 @@ bool is_token_char(char c) {
          c == '.';
 }
 
-bool is_no_json_number(const std::string& token) {
-  if (token == "NaN" || token == "Infinity" || token == "-Infinity") return true;
-  const bool may_overflow = token.size() > 300 || token.find_first_of("eE") != std::string::npos;
-  const bool is_number = token[0] == '-' || (token[0] >= '0' && token[0] <= '9');
-  return may_overflow && is_number && std::isinf(std::strtod(token.c_str(), nullptr));
+// Whether a bare word is a number that JSON cannot hold. Most words are short plain numbers, so the tests
+// that cost little come first.
+bool is_no_json_number(std::string_view word) {
+  if (word == "NaN" || word == "Infinity" || word == "-Infinity") return true;
+  const bool is_number = word[0] == '-' || (word[0] >= '0' && word[0] <= '9');
+  const bool may_overflow = word.size() > 300 || word.find_first_of("eE") != std::string_view::npos;
+  return is_number && may_overflow && std::isinf(std::strtod(std::string(word).c_str(), nullptr));
 }
 
 // Turns numbers that JSON cannot hold into texts of tildes of the same length, so that the rest of the file
@@ -55,9 +58,8 @@ void mask_numbers_beyond_json(std::string& text) {
     } else if (!in_string && is_token_char(text[i])) {
       std::size_t end = i;
       while (end < text.size() && is_token_char(text[end])) ++end;
-      const bool can_matter = end - i > 2 && (text[i] == 'N' || text[i] == 'I' || text[i] == '-' ||
-                                              end - i > 300 || text.find_first_of("eE", i) < end);
-      if (can_matter && is_no_json_number(text.substr(i, end - i))) {
+      const std::string_view word = std::string_view(text).substr(i, end - i);
+      if (word.size() > 2 && is_no_json_number(word)) {
         std::fill(text.begin() + static_cast<std::ptrdiff_t>(i),
                   text.begin() + static_cast<std::ptrdiff_t>(end), '~');
         text[i] = text[end - 1] = '"';
@@ -85,6 +87,9 @@ nlohmann::json read_json_file(const std::filesystem::path& file) {
     std::string reason = error.what();
     const auto colon = reason.find(": ");
     if (colon != std::string::npos) reason.erase(0, colon + 2);
+    // It also repeats what was read last, which may be the rest of the file.
+    constexpr std::size_t kLongest = 300;
+    if (reason.size() > kLongest) reason.replace(kLongest / 2, reason.size() - kLongest, " ... ");
     throw std::runtime_error(fmt::format("{}: line {}, byte {} of {}: {}{}", file.string(), line, error.byte,
                                          text.size(), reason,
                                          at >= text.size() ? " (the file seems to be cut short)" : ""));
@@ -101,7 +106,7 @@ const nlohmann::json& array_of(const nlohmann::json& document, const std::string
   if (found == document.end()) {
     std::string keys;
     for (const auto& item : document.items()) {
-      keys += (keys.empty() ? "\"" : ", \"") + item.key().substr(0, 40) + "\"";
+      keys += (keys.empty() ? "\"" : ", \"") + item.key() + "\"";
       if (keys.size() > 200) break;
     }
     throw std::runtime_error(fmt::format("{}: top level: got the keys {}, expected an array \"{}\"",
@@ -125,7 +130,11 @@ std::string describe(const nlohmann::json& value) {
   if (is_beyond_json(value)) return "a number that is not finite";
   if (value.is_string()) {
     const auto& text = value.get_ref<const std::string&>();
-    return fmt::format("the text \"{}{}\"", text.substr(0, kShown), text.size() > kShown ? "..." : "");
+    std::size_t shown = std::min(text.size(), kShown);
+    // Never cut a UTF-8 character: what is said here is stored as JSON again.
+    while (shown > 0 && shown < text.size() && (static_cast<unsigned char>(text[shown]) & 0xC0U) == 0x80U)
+      --shown;
+    return fmt::format("the text \"{}{}\"", text.substr(0, shown), shown < text.size() ? "..." : "");
   }
   if (value.is_array()) return fmt::format("{} value{}", value.size(), value.size() == 1 ? "" : "s");
   if (value.is_object()) return fmt::format("an object of {} keys", value.size());

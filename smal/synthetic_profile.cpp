@@ -84,9 +84,12 @@ void add_head(const Anatomy& a, const Vector3d& poll, std::vector<Station>& stat
   const double eyes = 1.0 - a.muzzle_share;
   place(45, 0.55 * eyes, 0.52 * a.cranium_depth, -0.48 * a.cranium_depth, a.cranium_width, 0.15);
   place(48, eyes, mouth + a.eye_depth, mouth, 0.80 * a.cranium_width + 0.1 * a.muzzle_width, 0.1);
-  place(51, 1.0 - 0.5 * a.muzzle_share, mouth + a.muzzle_depth, mouth, a.muzzle_width, -0.3);
-  place(54, 0.965, mouth + a.nose_depth, mouth + 0.05 * a.nose_depth, a.nose_width, -0.2);
-  place(55, 0.99, mouth + 0.85 * a.nose_depth, mouth + 0.25 * a.nose_depth, 0.6 * a.nose_width, -0.1);
+  // Close to the corner of the mouth, so that the line there turns at once and the jaw closes along it.
+  place(49, 1.0 - 0.84 * a.muzzle_share, mouth + 0.70 * a.eye_depth + 0.27 * a.muzzle_depth, mouth,
+        0.58 * a.cranium_width + 0.36 * a.muzzle_width, -0.35);
+  place(51, 1.0 - 0.5 * a.muzzle_share, mouth + a.muzzle_depth, mouth, a.muzzle_width, -0.6);
+  place(54, 0.965, mouth + a.nose_depth, mouth + 0.05 * a.nose_depth, a.nose_width, -0.5);
+  place(55, 0.99, mouth + 0.85 * a.nose_depth, mouth + 0.25 * a.nose_depth, 0.6 * a.nose_width, -0.3);
 }
 
 Eigen::VectorXd channels(const Station& station) {

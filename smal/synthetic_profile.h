@@ -37,10 +37,11 @@ struct BodyProfile {
 
 BodyProfile body_profile(const Anatomy& anatomy);
 
-// One ring of a tube: center + across cos(phi) + along sin(phi). phi = 0 is the middle of the hole's first
-// side, a quarter turn that of its last ring.
+// One ring of a tube: center + across cos(phi) + along (sin(phi) + level cos(phi)^2). phi = 0 is the middle
+// of the hole's first side, a quarter turn that of its last ring.
 struct TubeRing {
   Eigen::Vector3d center, across, along;
+  double level = 0.0;  // as in BodyRing
 };
 
 struct TubeProfile {

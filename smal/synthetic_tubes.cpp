@@ -36,7 +36,7 @@ TubeProfile rings_along(const std::vector<Knot>& knots, int rings, const Vector3
     const Eigen::VectorXd here = curve.at(ring);
     const Vector3d tangent = (curve.at(ring + 0.5) - curve.at(ring - 0.5)).head<3>();
     const Vector3d along = across_axis.cross(tangent).normalized();
-    profile.rings.push_back({here.head<3>(), here[3] * across_axis, here[4] * along});
+    profile.rings.push_back({here.head<3>(), here[3] * across_axis, here[4] * along, 0.0});
   }
   profile.pole = pole;
   return profile;
@@ -65,7 +65,7 @@ TubeProfile leg_rings(const std::vector<LegKnot>& knots, int rings, const Vector
   for (int ring = 0; ring < rings; ++ring) {
     const Eigen::VectorXd here = curve.at(ring);
     const Vector3d along(std::cos(here[5]), std::sin(here[5]), 0.0);
-    profile.rings.push_back({here.head<3>(), here[3] * Vector3d::UnitZ(), here[4] * along});
+    profile.rings.push_back({here.head<3>(), here[3] * Vector3d::UnitZ(), here[4] * along, 0.0});
   }
   profile.pole = pole;
   return profile;
@@ -157,11 +157,14 @@ TubeProfile jaw(const Tube& tube, const Anatomy& a, const BodyProfile& body) {
   const auto knot = [&](double ring, double share, double depth, double width) -> Knot {
     return {ring, corner.belly + share * length * forward - (gap + depth / 2) * up, width / 2, depth / 2};
   };
-  return rings_along({knot(0, 0.10, 1.35 * a.jaw_depth, 0.5 * (a.cranium_width * 0.75 + a.muzzle_width)),
-                      knot(3, 0.45, 1.05 * a.jaw_depth, 0.92 * a.muzzle_width),
-                      knot(6, 0.88, 0.85 * a.jaw_depth, 0.85 * a.nose_width),
-                      knot(7, 0.97, 0.55 * a.jaw_depth, 0.55 * a.nose_width)},
-                     tube.rings, Vector3d::UnitZ(), knot(8, 1.0, 0.55 * a.jaw_depth, 0).center);
+  TubeProfile profile =
+      rings_along({knot(0, 0.10, 1.35 * a.jaw_depth, 0.5 * (a.cranium_width * 0.75 + a.muzzle_width)),
+                   knot(3, 0.45, 1.05 * a.jaw_depth, 0.92 * a.muzzle_width),
+                   knot(6, 0.88, 0.85 * a.jaw_depth, 0.85 * a.nose_width),
+                   knot(7, 0.97, 0.55 * a.jaw_depth, 0.55 * a.nose_width)},
+                  tube.rings, Vector3d::UnitZ(), knot(8, 1.0, 0.55 * a.jaw_depth, 0).center);
+  for (TubeRing& ring : profile.rings) ring.level = 0.6;  // flat on top, as the muzzle is below
+  return profile;
 }
 
 TubeProfile ear(const Tube& tube, const Anatomy& a, const BodyProfile& body, const Vector3d& root) {
@@ -178,7 +181,8 @@ TubeProfile ear(const Tube& tube, const Anatomy& a, const BodyProfile& body, con
   for (int ring = 0; ring < tube.rings; ++ring) {
     const double half = widths[ring] * a.ear_width / 2;
     // The flat of the ear faces forwards and outwards: wide across, thin along.
-    profile.rings.push_back({root + shares[ring] * a.ear_length * out, half * across, 0.30 * half * along});
+    profile.rings.push_back(
+        {root + shares[ring] * a.ear_length * out, half * across, 0.30 * half * along, 0.0});
   }
   profile.pole = root + a.ear_length * out;
   return profile;
