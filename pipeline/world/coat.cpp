@@ -57,9 +57,10 @@ Eigen::Vector3f on_surface(const RestMesh& rest, const Eigen::Vector3f& point) {
   });
 }
 
+// Gamma 2 is close enough to a screen's, and cheap to undo.
 Colour linear(const Colour& screen) {
   return screen * screen;
-}  // gamma 2 is close enough, and cheap to undo
+}
 
 }  // namespace
 
