@@ -20,7 +20,7 @@ constexpr JointRange kEars[] = {{33, 34}};
 constexpr JointRange kNeck[] = {{15, 15}};
 
 // The keypoints that carry colour of their own.
-enum Keypoint { left_eye = 0, right_eye = 1, chin = 2, left_mouth = 22, right_mouth = 23, nose = 24 };
+enum Keypoint { left_eye = 0, right_eye = 1, left_mouth = 22, right_mouth = 23, nose = 24 };
 
 template <std::size_t N>
 float share(const std::array<float, kBodyJoints>& skinning, const JointRange (&parts)[N]) {
@@ -57,9 +57,10 @@ Eigen::Vector3f on_surface(const RestMesh& rest, const Eigen::Vector3f& point) {
   });
 }
 
+// Gamma 2 is close enough to a screen's, and cheap to undo.
 Colour linear(const Colour& screen) {
   return screen * screen;
-}  // gamma 2 is close enough, and cheap to undo
+}
 
 }  // namespace
 

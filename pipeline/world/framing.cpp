@@ -105,7 +105,7 @@ PictureCamera camera_of_box(const cv::Rect& box) {
     throw std::invalid_argument("camera_of_box: box of " + std::to_string(box.width) + " x " +
                                 std::to_string(box.height) + " px");
   }
-  // The crop's centre is floored (official code: get_example's caller), its side is the box's longer one.
+  // Official code: the datasets' centre is (2 x + w) // 2, the crop's side is the box's longer one.
   return {kCropFocalPx * std::max(box.width, box.height) / kCropSidePx,
           std::floor((2.0 * box.x + box.width) / 2.0), std::floor((2.0 * box.y + box.height) / 2.0)};
 }
@@ -139,9 +139,10 @@ Framing frame_animal(std::span<const Eigen::Vector3f> vertices, cv::Size picture
   // The camera depends on the box, the silhouette on the camera, and the box on the silhouette; the
   // dependence is weak, because the animal is four or more of its own lengths away.
   Framing framing;
-  const double half = 0.5 * placement.side_px;
-  Extent seen{placement.centre_px.x - half, placement.centre_px.y - half / aspect,
-              placement.centre_px.x + half, placement.centre_px.y + half / aspect};
+  const double half_w = 0.5 * placement.side_px * std::min(1.0, aspect);
+  const double half_h = 0.5 * placement.side_px / std::max(1.0, aspect);
+  Extent seen{placement.centre_px.x - half_w, placement.centre_px.y - half_h, placement.centre_px.x + half_w,
+              placement.centre_px.y + half_h};
   for (int round = 0; round < 4; ++round) {
     framing.box = drawn_box(clipped(seen, picture_px), error, picture_px);
     framing.camera = camera_of_box(framing.box);

@@ -71,16 +71,17 @@ void infrared(cv::Mat& picture, Rng& rng) {
   }
 }
 
-void stamp(cv::Mat& picture, Rng& rng) {
-  const int bar = std::max(12, picture.rows / 14);
-  const int top = rng.chance(0.7) ? picture.rows - bar : 0;
-  cv::rectangle(picture, cv::Rect(0, top, picture.cols, bar), cv::Scalar(12, 12, 12), cv::FILLED);
+cv::Rect stamp(cv::Mat& picture, Rng& rng) {
+  const int height = std::max(12, picture.rows / 14);
+  const cv::Rect bar(0, rng.chance(0.7) ? picture.rows - height : 0, picture.cols, height);
+  cv::rectangle(picture, bar, cv::Scalar(12, 12, 12), cv::FILLED);
   char text[96];
   std::snprintf(text, sizeof text, "CAM%02d  20%02d-%02d-%02d  %02d:%02d:%02d  %02dC", 1 + rng.below(40),
                 10 + rng.below(14), 1 + rng.below(12), 1 + rng.below(28), rng.below(24), rng.below(60),
                 rng.below(60), rng.below(35));
-  cv::putText(picture, text, cv::Point(6, top + bar - bar / 3), cv::FONT_HERSHEY_SIMPLEX, bar / 36.0,
+  cv::putText(picture, text, cv::Point(6, bar.br().y - height / 3), cv::FONT_HERSHEY_SIMPLEX, height / 36.0,
               cv::Scalar(235, 235, 235), 1, cv::LINE_AA);
+  return bar;
 }
 
 void add_noise(cv::Mat& picture, double deviation, Rng& rng) {
@@ -92,14 +93,14 @@ void add_noise(cv::Mat& picture, double deviation, Rng& rng) {
 
 }  // namespace
 
-void expose(cv::Mat& picture, const LensHabits& habits, Rng& rng) {
+cv::Rect expose(cv::Mat& picture, const LensHabits& habits, Rng& rng) {
   const double sigma = rng.uniform(habits.blur_low, habits.blur_high);
   if (sigma > 0.3) cv::GaussianBlur(picture, picture, {}, sigma);
   if (rng.chance(habits.motion)) smear(picture, rng);
   grade(picture, habits, rng);
   if (rng.chance(habits.grey)) infrared(picture, rng);
   add_noise(picture, rng.uniform(habits.noise_low, habits.noise_high), rng);
-  if (rng.chance(habits.stamped)) stamp(picture, rng);
+  return rng.chance(habits.stamped) ? stamp(picture, rng) : cv::Rect();
 }
 
 std::vector<std::uint8_t> encode_jpeg(const cv::Mat& picture, const LensHabits& habits, Rng& rng) {

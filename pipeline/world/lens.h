@@ -20,8 +20,9 @@ struct LensHabits {
   int quality_low = 75, quality_high = 95;  // JPEG
 };
 
-// Changes the picture (BGR, 8 bit) in place.
-void expose(cv::Mat& picture, const LensHabits& habits, Rng& rng);
+// Changes the picture (BGR, 8 bit) in place. Returns the bar that the camera has stamped over it, or an empty
+// one.
+cv::Rect expose(cv::Mat& picture, const LensHabits& habits, Rng& rng);
 
 // JPEG bytes. Throws std::runtime_error when the encoder fails.
 std::vector<std::uint8_t> encode_jpeg(const cv::Mat& picture, const LensHabits& habits, Rng& rng);

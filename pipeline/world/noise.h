@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <cstdint>
 
@@ -21,8 +22,7 @@ class NoiseField {
 
   struct Cell {
     float nearest = 0.0F;     // distance to the nearest feature point, in lattice steps
-    float second = 0.0F;      // and to the one after it
-    std::uint32_t label = 0;  // random number of the nearest point
+    std::uint32_t label = 0;  // its random number, 0 to 255
   };
   // Cellular noise: one jittered feature point for each lattice cube.
   Cell cell(const Eigen::Vector3f& p) const;
@@ -33,7 +33,7 @@ class NoiseField {
   }
   std::array<std::uint8_t, 256> order_{};
   std::array<float, 256> value_{};
-  std::array<Eigen::Vector3f, 256> jitter_{};
+  std::array<Eigen::Vector3f, 256> jitter_;
 };
 
 inline float smooth_step(float low, float high, float x) {

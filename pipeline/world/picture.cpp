@@ -169,7 +169,7 @@ Picture PictureRenderer::render_one(const PicturePlan& plan, const Subject& subj
   if (rng.chance(domain.occluded)) occlude(picture, cover, silhouette, backdrop, rng);
 
   rng = stream(plan, lens);
-  expose(picture, domain.lens, rng);
+  cover(expose(picture, domain.lens, rng)).setTo(255);
   result.jpeg = encode_jpeg(picture, domain.lens, rng);
   const cv::Mat1b visible = silhouette & ~cover;
   if (!cv::imencode(".png", visible, result.mask_png, {cv::IMWRITE_PNG_COMPRESSION, 1})) {

@@ -6,6 +6,8 @@
 #include <embree3/rtcore.h>
 #endif
 
+#include <oneapi/tbb/task_arena.h>
+
 #include <algorithm>
 #include <cstring>
 #include <limits>
@@ -68,8 +70,8 @@ struct RayDevice::Handle {
 };
 
 RayDevice::RayDevice() : handle_(std::make_unique<Handle>()) {
-  // One thread: pictures are rendered in parallel, and a hierarchy built by one thread is always the same.
-  handle_->device = rtcNewDevice("threads=1,start_threads=0");
+  // Not "threads=1": Embree would hold all of TBB, and with it the whole program, to one thread.
+  handle_->device = rtcNewDevice("start_threads=0");
   if (handle_->device == nullptr) {
     throw std::runtime_error("ray tracing: Embree cannot start (error " +
                              std::to_string(static_cast<int>(rtcGetDeviceError(nullptr))) + ")");
@@ -104,7 +106,10 @@ RayMesh::RayMesh(const RayDevice& device, std::span<const Eigen::Vector3f> verti
   rtcCommitGeometry(geometry);
   rtcAttachGeometry(handle_->scene, geometry);
   rtcReleaseGeometry(geometry);
-  rtcCommitScene(handle_->scene);
+  // An arena of one thread: pictures are what runs in parallel, and a hierarchy that one thread builds is
+  // always the same.
+  tbb::task_arena alone(1);
+  alone.execute([&] { rtcCommitScene(handle_->scene); });
   if (const RTCError error = rtcGetDeviceError(rtc); error != RTC_ERROR_NONE) {
     throw std::runtime_error("ray tracing: Embree refuses a mesh of " + std::to_string(vertices.size()) +
                              " vertices and " + std::to_string(triangles.size()) + " triangles (error " +

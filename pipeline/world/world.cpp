@@ -92,6 +92,11 @@ void write_json(const fs::path& path, const nlohmann::json& content) {
   manifests::write_file_atomically(path, content.dump());
 }
 
+void save_asset(const BodyModel& model, const fs::path& path) {
+  if (path.has_parent_path()) fs::create_directories(path.parent_path());
+  model.save(path);
+}
+
 std::string split_name(const PicturePlan& plan) {
   return fmt::format("{}/{}", domain_of(plan.set).folder, plan.test ? "test" : "train");
 }
@@ -125,7 +130,7 @@ class Run {
         arena_(options.threads == 0 ? tbb::task_arena::automatic : options.threads),
         renderer_(options.seed, options.picture_px) {}
 
-  void save_asset(const fs::path& path) const { renderer_.model().save(path); }
+  const BodyModel& model() const { return renderer_.model(); }
 
   WorldSummary all() {
     std::vector<std::vector<PicturePlan>> splits;
@@ -191,12 +196,12 @@ WorldSummary make_world(const WorldOptions& options) {
     WorldSummary summary{
         .pictures = pictures->get<std::map<std::string, int>>(), .reused = true, .asset = asset};
     for (const auto& [split, count] : summary.pictures) summary.total += count;
+    if (!fs::exists(asset)) save_asset(BodyModel(), asset);
     return summary;
   }
   clear_unfinished(options.out);
-  fs::create_directories(asset.parent_path());
   Run run(options);
-  run.save_asset(asset);
+  save_asset(run.model(), asset);
   WorldSummary summary = run.all();
   summary.asset = asset;
   write_json(options.out / "world.json", {{"options", options_of(options)}, {"pictures", summary.pictures}});

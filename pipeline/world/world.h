@@ -22,7 +22,7 @@ struct WorldOptions {
   std::filesystem::path out;
   std::uint64_t seed = 0;
   int picture_px = 320;         // longer side of a photograph; Animal Kingdom's frames are twice as wide
-  double share = 1.0;           // of the default number of pictures (docs: domain.cpp)
+  double share = 1.0;           // of the default number of pictures, 5,000
   int threads = 0;              // 0 = one for each core; never changes a byte
   std::filesystem::path asset;  // where the body model goes; empty = below out
   std::function<void(int done, int total)> progress;  // called from the calling thread

@@ -90,6 +90,11 @@ TEST_F(WorldFiles, AFinishedWorldIsKeptAndOtherFoldersAreLeftAlone) {
   EXPECT_TRUE(make_world(options_for(out(), 1)).reused);
   EXPECT_EQ(fs::last_write_time(out() / "world.json"), before);
 
+  WorldOptions elsewhere = options_for(out(), 1);
+  elsewhere.asset = *folder_ / "models" / "body.safetensors";
+  EXPECT_TRUE(make_world(elsewhere).reused);
+  EXPECT_TRUE(manifests::read_file(elsewhere.asset) == manifests::read_file(summary_->asset));
+
   WorldOptions changed = options_for(out(), 1);
   changed.seed = 9;
   EXPECT_THROW(make_world(changed), std::runtime_error);
