@@ -51,11 +51,12 @@ BoxVote vote_on_boxes(std::span<const SampleRecord> records) {
   for (const SampleRecord& record : records) {
     if (record.failure != Reason::none) continue;
     const Box corners = box_from_corners(record.box);
-    const bool corners_fit = corners.w_px > 0.0 && corners.h_px > 0.0 && fits_image(corners, record) &&
-                             holds_keypoints(corners, record.keypoints);
+    const bool in_order = corners.w_px > 0.0 && corners.h_px > 0.0;
+    const bool corners_fit =
+        in_order && fits_image(corners, record) && holds_keypoints(corners, record.keypoints);
     const bool extents_fit = fits_image(record.box, record) && holds_keypoints(record.box, record.keypoints);
     if (corners_fit && !extents_fit) ++vote.corners;
-    if (!corners_fit) ++vote.extents;
+    if (!in_order || (extents_fit && !corners_fit)) ++vote.extents;
   }
   return vote;
 }

@@ -19,14 +19,13 @@ struct BoxProblem {
 std::optional<BoxProblem> find_box_problem(const manifests::Box& box, int width_px, int height_px);
 
 // COCO writes x, y, width, height. Pseudo-labels of DeepLabCut's video adaptation, AnimalPose and AwA-Pose
-// write x1, y1, x2, y2 under the same name. The four numbers of a record speak for the second reading when
-// its corners lie in order, inside the image and around all labelled keypoints while the first reading passes
-// the image's border or leaves keypoints out; for the first when they contradict the second. Often they fit
-// both. A file is written one way, so the majority of the records that speak decides; a tie is x, y, width,
-// height.
+// write x1, y1, x2, y2 under the same name. A reading fits a record when the box ends inside the image and
+// holds all labelled keypoints; often both readings do. A record whose box fits as corners alone speaks for
+// corners; one whose box does not, or whose corners are out of order, speaks against. A file is written one
+// way, so the majority of the records that speak decides; a tie is x, y, width, height.
 struct BoxVote {
-  std::size_t corners = 0;  // records that only x1, y1, x2, y2 explains
-  std::size_t extents = 0;  // records that contradict x1, y1, x2, y2
+  std::size_t corners = 0;  // records that fit as x1, y1, x2, y2 alone
+  std::size_t extents = 0;  // records that fit as x, y, width, height alone
   bool is_corners() const { return corners > extents; }
 };
 

@@ -31,11 +31,13 @@ std::vector<std::string> keypoint_names(const nlohmann::json& document) {
   const auto categories = document.find("categories");
   if (categories == document.end() || !categories->is_array()) return names;
   for (const auto& category : *categories) {
-    if (!category.is_object() || !category.contains("keypoints") || !category["keypoints"].is_array())
-      continue;
-    for (const auto& name : category["keypoints"])
-      names.push_back(name.is_string() ? name.get<std::string>() : "");
-    if (!names.empty()) break;
+    const bool lists_any = category.is_object() && category.contains("keypoints") &&
+                           category["keypoints"].is_array() && !category["keypoints"].empty();
+    if (!lists_any) continue;
+    for (const auto& name : category["keypoints"]) {
+      names.push_back(name.is_string() ? name.get<std::string>() : describe(name));
+    }
+    break;
   }
   return names;
 }
@@ -83,7 +85,7 @@ CocoFile index_file(const nlohmann::json& document, const Topology& topology, Lo
     if (id && !file.image_of_id.emplace(*id, &image).second) ++repeated;
   }
   if (repeated > 0) {
-    loading.notes.add(fmt::format("{} images repeat an id; the first of each is taken", repeated));
+    loading.notes.add(fmt::format("images that repeat an id (the first of each is taken): {}", repeated));
   }
   std::unordered_set<std::int64_t> ids;
   std::unordered_set<std::int64_t> used_images;
@@ -94,7 +96,7 @@ CocoFile index_file(const nlohmann::json& document, const Topology& topology, Lo
   file.ids_are_distinct = ids.size() == file.annotations.size();
   const auto unused = std::count_if(file.image_of_id.begin(), file.image_of_id.end(),
                                     [&](const auto& image) { return !used_images.contains(image.first); });
-  if (unused > 0) loading.notes.add(fmt::format("{} images have no annotation", unused));
+  if (unused > 0) loading.notes.add(fmt::format("images without an annotation: {}", unused));
   return file;
 }
 
@@ -125,8 +127,8 @@ void read_annotation(const CocoFile& file, std::size_t index, Loading& loading, 
   sample.box = annotation.box("bbox");  // the four numbers as they stand
   const std::vector<manifests::Keypoint> in_file = annotation.keypoints("keypoints", file.order.size());
   std::vector<manifests::Keypoint> points(file.order.size());
-  for (std::size_t i = 0; i < points.size(); ++i)
-    points[i] = in_file[static_cast<std::size_t>(file.order[i])];
+  std::transform(file.order.begin(), file.order.end(), points.begin(),
+                 [&](int place) { return in_file[static_cast<std::size_t>(place)]; });
   sample.keypoints = to_animal3d(file.topology, points);
   add(loading, annotation, sample);
   check_visible(annotation, "keypoints", sample);
@@ -149,8 +151,8 @@ Dataset load_coco(const nlohmann::json& document, const Topology& topology, Load
   const BoxVote vote = vote_on_boxes(records);
   if (vote.corners > 0) {
     loading.notes.add(fmt::format(
-        "boxes: {} records fit only x1, y1, x2, y2 and {} contradict it; read as {}", vote.corners,
-        vote.extents, vote.is_corners() ? "x1, y1, x2, y2" : "x, y, width, height"));
+        "boxes: {} records fit as x1, y1, x2, y2 alone and {} as x, y, width, height alone; read as {}",
+        vote.corners, vote.extents, vote.is_corners() ? "x1, y1, x2, y2" : "x, y, width, height"));
   }
   for (std::size_t i = 0; i < records.size(); ++i) {
     if (vote.is_corners()) records[i].box = box_from_corners(records[i].box);

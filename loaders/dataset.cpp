@@ -81,8 +81,8 @@ void check_box(RecordReader& reader, const std::string& field, const SampleRecor
 void check_visible(RecordReader& reader, const std::string& field, const SampleRecord& sample) {
   const bool any = std::any_of(sample.keypoints.begin(), sample.keypoints.end(),
                                [](const manifests::Keypoint& point) { return point.weight > 0.0F; });
-  if (!any)
-    reader.fail(Reason::no_visible_keypoints, field, "v <= 0 throughout the 26", "a labelled keypoint");
+  if (any) return;
+  reader.fail(Reason::no_visible_keypoints, field, "v <= 0 throughout the 26", "a labelled keypoint");
 }
 
 void set_family(Loading& loading, std::optional<Family> stated, std::optional<Family> from_table,
@@ -101,21 +101,14 @@ void set_family(Loading& loading, std::optional<Family> stated, std::optional<Fa
 }
 
 Dataset finished(Loading& loading, std::vector<SampleRecord> records) {
-  if (loading.finder.found_by_tail() > 0) {
-    loading.notes.add(
-        fmt::format("{} picture names are absolute paths of another disk; found by their last parts",
-                    loading.finder.found_by_tail()));
-  }
-  if (loading.finder.shared_files() > 0) {
-    loading.notes.add(
-        fmt::format("{} of these name a file that another path of that disk was found as; check which "
-                    "of them the annotation is about",
-                    loading.finder.shared_files()));
-  }
-  if (loading.finder.found_by_spelling() > 0) {
-    loading.notes.add(fmt::format("{} picture names differ from the files in letter case, '+' or .jpeg",
-                                  loading.finder.found_by_spelling()));
-  }
+  const auto note = [&](const char* text, std::size_t count) {
+    if (count > 0) loading.notes.add(fmt::format("{}: {}", text, count));
+  };
+  const PictureFinder& finder = loading.finder;
+  note("absolute names of another disk, found by their last parts", finder.found_by_tail());
+  note("of these, names for a file that another of them names too (one must be wrong)",
+       finder.shared_files());
+  note("picture names that differ from the file's in letter case, '+' or .jpeg", finder.found_by_spelling());
   return {std::move(records), loading.notes.list()};
 }
 

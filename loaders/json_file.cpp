@@ -87,6 +87,9 @@ nlohmann::json read_json_file(const std::filesystem::path& file) {
     std::string reason = error.what();
     const auto colon = reason.find(": ");
     if (colon != std::string::npos) reason.erase(0, colon + 2);
+    // It also repeats what was read last, which may be the rest of the file.
+    constexpr std::size_t kLongest = 300;
+    if (reason.size() > kLongest) reason.replace(kLongest / 2, reason.size() - kLongest, " ... ");
     throw std::runtime_error(fmt::format("{}: line {}, byte {} of {}: {}{}", file.string(), line, error.byte,
                                          text.size(), reason,
                                          at >= text.size() ? " (the file seems to be cut short)" : ""));
@@ -103,7 +106,7 @@ const nlohmann::json& array_of(const nlohmann::json& document, const std::string
   if (found == document.end()) {
     std::string keys;
     for (const auto& item : document.items()) {
-      keys += (keys.empty() ? "\"" : ", \"") + item.key().substr(0, 40) + "\"";
+      keys += (keys.empty() ? "\"" : ", \"") + item.key() + "\"";
       if (keys.size() > 200) break;
     }
     throw std::runtime_error(fmt::format("{}: top level: got the keys {}, expected an array \"{}\"",
@@ -127,7 +130,11 @@ std::string describe(const nlohmann::json& value) {
   if (is_beyond_json(value)) return "a number that is not finite";
   if (value.is_string()) {
     const auto& text = value.get_ref<const std::string&>();
-    return fmt::format("the text \"{}{}\"", text.substr(0, kShown), text.size() > kShown ? "..." : "");
+    std::size_t shown = std::min(text.size(), kShown);
+    // Never cut a UTF-8 character: what is said here is stored as JSON again.
+    while (shown > 0 && shown < text.size() && (static_cast<unsigned char>(text[shown]) & 0xC0U) == 0x80U)
+      --shown;
+    return fmt::format("the text \"{}{}\"", text.substr(0, shown), shown < text.size() ? "..." : "");
   }
   if (value.is_array()) return fmt::format("{} value{}", value.size(), value.size() == 1 ? "" : "s");
   if (value.is_object()) return fmt::format("an object of {} keys", value.size());

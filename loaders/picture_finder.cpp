@@ -149,8 +149,9 @@ std::optional<FoundPicture> PictureFinder::existing(const fs::path& path) {
   fs::path resolved;
   if (fs::is_symlink(own)) {
     resolved = fs::canonical(path, error);
-    if (error)
+    if (error) {
       return FoundPicture{{}, Reason::image_missing, fmt::format("{}, a link to nothing", path.string())};
+    }
     if (fs::is_directory(resolved, error)) return std::nullopt;
   } else {
     // Most pictures share few folders: resolving each folder once saves a system call a component.
@@ -173,7 +174,11 @@ bool PictureFinder::is_allowed(const fs::path& resolved) const {
 
 std::string id_part(std::string_view name) {
   const fs::path normal = fs::path(name).lexically_normal();
-  return normal.is_absolute() || climbs_out(normal) ? normal.filename().string() : normal.generic_string();
+  std::string part =
+      normal.is_absolute() || climbs_out(normal) ? normal.filename().string() : normal.generic_string();
+  std::replace_if(
+      part.begin(), part.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '_');
+  return part;
 }
 
 }  // namespace q3d::loaders

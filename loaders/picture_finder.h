@@ -63,8 +63,8 @@ class PictureFinder {
   std::size_t shared_files_ = 0;
 };
 
-// The name as it goes into a sample id: relative to the root, without "." and ".."; the base name where the
-// file gives an absolute name or climbs out.
+// The name as it goes into a sample id: relative to the root, without "." and "..", on one line; the base
+// name where the file gives an absolute name or climbs out.
 std::string id_part(std::string_view name);
 
 }  // namespace q3d::loaders

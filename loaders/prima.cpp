@@ -20,10 +20,11 @@ constexpr std::size_t kPoseNumbers = manifests::kNumJoints * 3;
 constexpr std::size_t kBetas = manifests::kNumBetas;
 constexpr std::size_t kFirstBetas = 20;  // `shape`; the other 21 are `shape_extra`
 
+// `values` come from a reader that has checked their number; they fit.
 template <std::size_t N>
 void copy_into(std::array<float, N>& target, const std::vector<double>& values, std::size_t at = 0) {
-  for (std::size_t i = 0; i < values.size() && at + i < N; ++i)
-    target[at + i] = static_cast<float>(values[i]);
+  std::transform(values.begin(), values.end(), target.begin() + static_cast<std::ptrdiff_t>(at),
+                 [](double value) { return static_cast<float>(value); });
 }
 
 template <std::size_t N>

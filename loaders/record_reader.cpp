@@ -56,10 +56,10 @@ std::string RecordReader::optional_text(const std::string& field) {
 
 std::optional<double> RecordReader::number(const std::string& field) {
   const nlohmann::json* value = find(field);
+  if (value == nullptr) return std::nullopt;
   std::vector<double> one;
-  if (value == nullptr || !append(
-                              *value, [&] { return field; }, one))
-    return std::nullopt;
+  const auto path = [&] { return field; };
+  if (!append(*value, path, one)) return std::nullopt;
   return one.front();
 }
 

@@ -15,8 +15,7 @@
 namespace q3d::model {
 namespace {
 
-using Member =
-    std::variant<std::int64_t PrimaConfig::*, double PrimaConfig::*, bool PrimaConfig::*>;
+using Member = std::variant<std::int64_t PrimaConfig::*, double PrimaConfig::*, bool PrimaConfig::*>;
 
 struct Field {
   std::string_view key;
@@ -140,10 +139,10 @@ PrimaConfig config_from_json(const nlohmann::json& json) {
     const Member member = find_field(key).member;
     if (const auto* size = std::get_if<std::int64_t PrimaConfig::*>(&member)) {
       require_type(key, value, value.is_number_integer(), "an integer");
-      config.**size = value.get<std::int64_t>();
+      config.** size = value.get<std::int64_t>();
     } else if (const auto* real = std::get_if<double PrimaConfig::*>(&member)) {
       require_type(key, value, value.is_number(), "a number");
-      config.**real = value.get<double>();
+      config.** real = value.get<double>();
     } else {
       require_type(key, value, value.is_boolean(), "true or false");
       config.*std::get<bool PrimaConfig::*>(member) = value.get<bool>();

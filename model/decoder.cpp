@@ -28,8 +28,8 @@ torch::Tensor position_encoding(std::int64_t width) {
 }
 
 // Weight of each of `count` cells for a coordinate in [-0.5, 0.5] along one axis: (B, N) -> (B, N, count).
-// Linear interpolation between cell centres is a hat function round each centre; outside the grid the hats are
-// missing, which is zero padding.
+// Linear interpolation between cell centres is a hat function round each centre; outside the grid the hats
+// are missing, which is zero padding.
 torch::Tensor hat_weights(const torch::Tensor& coordinate, std::int64_t count) {
   const torch::Tensor cell = (coordinate * 2.0 + 1.0) * (static_cast<double>(count) / 2.0) - 0.5;
   const torch::Tensor centres = torch::arange(count, coordinate.options());
@@ -119,8 +119,8 @@ Decoder::Decoder(const PrimaConfig& config, const Placement& placement) : rounds
   bio_to_betas_init_ = mlp("bio_to_betas_init", config.embed_dim, 256, kBetas, exact, 0.2);
   shape_projector_ = mlp("shape_projector", kBetas, 128, 128, exact);
   const auto to_token = register_module("param_to_token", std::make_shared<torch::nn::Module>());
-  param_to_token_ = to_token->register_module(
-      "0", std::make_shared<Linear>(kPose6d + kBetas + kCamera, width, exact));
+  param_to_token_ =
+      to_token->register_module("0", std::make_shared<Linear>(kPose6d + kBetas + kCamera, width, exact));
   param_to_token_norm_ =
       to_token->register_module("1", std::make_shared<LayerNorm>(width, kNormEpsilon, placement));
   keypoint_2d_embeddings_ = embedding("keypoint_2d_embeddings");
@@ -132,8 +132,7 @@ Decoder::Decoder(const PrimaConfig& config, const Placement& placement) : rounds
   kp2d_from_tokens_ = mlp("kp2d_from_tokens", width, width, 2, placement);
   kp3d_from_tokens_ = mlp("kp3d_from_tokens", width, width, 3, placement);
   if (config.embed_dim != width) {
-    image_proj_ =
-        register_module("image_proj", std::make_shared<Linear>(config.embed_dim, width, placement));
+    image_proj_ = register_module("image_proj", std::make_shared<Linear>(config.embed_dim, width, placement));
   }
   position_ = position_encoding(width).to(placement.device);
   const auto layers = register_module("layers", std::make_shared<torch::nn::Module>());
@@ -179,8 +178,7 @@ Decoder::KeypointUpdate Decoder::update_keypoints(const torch::Tensor& tokens,
   KeypointUpdate update;
   update.keypoints_2d = torch::tanh(kp2d_from_tokens_->forward(tokens.narrow(1, 1, kKeypoints))) * 0.5;
   update.augment_2d = keypoint_2d_pos_encoder_->forward(update.keypoints_2d);
-  update.features_2d =
-      sample_grid(sampled_source, update.keypoints_2d) + keypoint_2d_feat_linear_->bias;
+  update.features_2d = sample_grid(sampled_source, update.keypoints_2d) + keypoint_2d_feat_linear_->bias;
   update.keypoints_3d = kp3d_from_tokens_->forward(tokens.narrow(1, 1 + kKeypoints, kKeypoints));
   // The position encoder sees the keypoints relative to the mean of the first two (the eyes).
   const torch::Tensor centre = update.keypoints_3d.narrow(1, 0, 2).mean(1, /*keepdim=*/true);

@@ -1,9 +1,11 @@
-// Fresh weights. Only uniform draws from a counter-based generator are used, so that a seed gives the same bytes
-// on every machine: library normal distributions go through vectorised logarithms that differ between CPUs.
+// Fresh weights. Only uniform draws from a counter-based generator are used, so that a seed gives the same
+// bytes on every machine: library normal distributions go through vectorised logarithms that differ between
+// CPUs.
+#include "model/init.h"
+
 #include <cmath>
 #include <string_view>
 
-#include "model/checkpoint.h"
 #include "model/prima.h"
 
 namespace q3d::model {
@@ -37,7 +39,9 @@ bool ends_with(std::string_view name, std::string_view end) {
   return name.size() >= end.size() && name.substr(name.size() - end.size()) == end;
 }
 
-bool contains(std::string_view name, std::string_view part) { return name.find(part) != std::string_view::npos; }
+bool contains(std::string_view name, std::string_view part) {
+  return name.find(part) != std::string_view::npos;
+}
 
 bool is_layer_norm(std::string_view name) {
   return contains(name, "norm") || contains(name, ".ln_") || contains(name, "projection.1.") ||
@@ -61,6 +65,8 @@ double uniform_bound(const TensorSpec& spec) {
   return 1.0 / std::sqrt(fan_in);
 }
 
+}  // namespace
+
 torch::Tensor initial_tensor(const TensorSpec& spec, std::uint64_t seed) {
   if (ends_with(spec.name, "init_pose")) {  // the identity, 35 times: columns (1, 0, 0) and (0, 1, 0)
     return torch::tensor({1.0F, 0.0F, 0.0F, 0.0F, 1.0F, 0.0F}).repeat({1, kPose6d / 6});
@@ -74,10 +80,15 @@ torch::Tensor initial_tensor(const TensorSpec& spec, std::uint64_t seed) {
   return tensor;
 }
 
-}  // namespace
+void initialise(PrimaNet& net, std::uint64_t seed) {
+  const torch::NoGradGuard no_grad;
+  for (auto& parameter : net.named_parameters()) {
+    parameter.value().copy_(initial_tensor({parameter.key(), parameter.value().sizes().vec()}, seed));
+  }
+}
 
-void write_initial_checkpoint(const std::filesystem::path& path, const PrimaConfig& config, std::uint64_t seed,
-                              torch::ScalarType dtype) {
+void write_initial_checkpoint(const std::filesystem::path& path, const PrimaConfig& config,
+                              std::uint64_t seed, torch::ScalarType dtype) {
   smal::NamedTensors tensors;
   for (const TensorSpec& spec : expected_tensors(config)) {
     tensors.emplace_back(spec.name, initial_tensor(spec, seed).to(dtype));

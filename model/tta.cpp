@@ -62,6 +62,7 @@ void check_arguments(const Prima& prima, const ImageFeatures& features, const to
   require_features(prima.net(), features);
   require(!prima.net().is_training(), "the network is in training mode; call eval() first");
   const std::int64_t batch = features.bio_token.size(0);
+  require(batch >= 1, "an empty batch");
   require(keypoints.dim() == 3 && keypoints.size(0) == batch && keypoints.size(1) == kKeypoints &&
               keypoints.size(2) == 3,
           fmt::format("keypoints: expected ({}, {}, 3), got {} dimensions, {} numbers", batch, kKeypoints,
@@ -87,7 +88,8 @@ bool wants_to_stop(const TtaSchedule& schedule, const std::vector<double>& l_pro
   const int taken = static_cast<int>(l_proj.size()) - 1;
   if (taken >= schedule.iterations) return true;
   if (schedule.stop_below > 0.0 && l_proj.back() < schedule.stop_below) return true;
-  return schedule.min_gain > 0.0 && taken == schedule.gain_window && relative_gain(l_proj) < schedule.min_gain;
+  return schedule.min_gain > 0.0 && taken == schedule.gain_window &&
+         relative_gain(l_proj) < schedule.min_gain;
 }
 
 // The active instances at one iterate.
@@ -151,8 +153,7 @@ class Adaptation {
     const torch::AutoGradMode mode(with_gradient);
     const DecoderOutput output =
         decoder().refine(slots_.memory(), slots_.initial_betas(), from_list(parameters));
-    const torch::Tensor projected =
-        projected_keypoints(prima_.body(), output, prima_.config().focal_px);
+    const torch::Tensor projected = projected_keypoints(prima_.body(), output, prima_.config().focal_px);
     const KeypointTargets targets = slots_.targets();
     Iterate iterate;
     iterate.loss = objective(options_, projected, output.aux_keypoints_2d, targets);
@@ -178,7 +179,8 @@ class Adaptation {
       std::vector<double>& l_proj = result_.l_proj[instance];
       result_.loss[instance].push_back(rows[0][slot]);
       accepted.push_back(slot);
-      if (l_proj.empty() || rows[1][slot] < l_proj[static_cast<std::size_t>(result_.best_iteration[instance])]) {
+      if (l_proj.empty() ||
+          rows[1][slot] < l_proj[static_cast<std::size_t>(result_.best_iteration[instance])]) {
         improved.push_back(slot);
         result_.best_iteration[instance] = taken_;
       }

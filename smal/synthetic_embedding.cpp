@@ -50,10 +50,7 @@ std::vector<double> ring_angles(const Hole& hole) {
 
 Vector3d border_center(const QuadrupedMesh& mesh, const Hole& hole, const Points& points) {
   Vector3d sum = Vector3d::Zero();
-  for (const auto& [ring, side] : hole_border(hole)) {
-    const auto& row = mesh.rings_of(Part::body)[static_cast<std::size_t>(ring)];
-    sum += points.row(row[static_cast<std::size_t>((side + kBodySides) % kBodySides)]).transpose();
-  }
+  for (const int vertex : border_vertices(mesh, hole)) sum += points.row(vertex).transpose();
   return sum / hole.border();
 }
 
@@ -85,12 +82,10 @@ std::vector<int> steps_from_holes(const QuadrupedMesh& mesh) {
   std::vector<int> steps(mesh.vertices.size(), kSeamReach);
   std::deque<int> front;
   for (const Tube& tube : kTubes) {
-    for (const auto& [ring, side] : hole_border(tube.hole)) {
-      const auto& row = mesh.rings_of(Part::body)[static_cast<std::size_t>(ring)];
-      const int vertex = row[static_cast<std::size_t>((side + kBodySides) % kBodySides)];
+    for (const int vertex : border_vertices(mesh, tube.hole)) {
       for (const int v : {vertex, mesh.mirror[static_cast<std::size_t>(vertex)]}) {
-        steps[static_cast<std::size_t>(v)] =
-            std::min(steps[static_cast<std::size_t>(v)], first_step(tube.part));
+        int& step = steps[static_cast<std::size_t>(v)];
+        step = std::min(step, first_step(tube.part));
         front.push_back(v);
       }
     }
@@ -128,17 +123,13 @@ void smooth_seams(const QuadrupedMesh& mesh, Points& points) {
   }
 }
 
-void mirror_left_half(const QuadrupedMesh& mesh, Points& points) {
+// The mirror image of the right half, exact to the last bit, and a middle at z = 0.
+void mirror_right_half(const QuadrupedMesh& mesh, Points& points) {
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
     const auto here = static_cast<Eigen::Index>(v);
     const int other = mesh.mirror[v];
-    if (other == here) {
-      points(here, 2) = 0.0;
-    } else if (mesh.vertices[v].part != mesh.vertices[static_cast<std::size_t>(other)].part
-                   ? other > here
-                   : points(here, 2) > 0) {
-      points.row(other) << points(here, 0), points(here, 1), -points(here, 2);
-    }
+    if (other == here) points(here, 2) = 0.0;
+    if (mesh.half[v] > 0) points.row(other) << points(here, 0), points(here, 1), -points(here, 2);
   }
 }
 
@@ -149,9 +140,9 @@ Points embed_quadruped(const QuadrupedMesh& mesh, const Anatomy& anatomy) {
   const BodyProfile body = body_profile(anatomy);
   place_body(mesh, body, points);
   for (const Tube& tube : kTubes) place_tube(mesh, tube, anatomy, body, points);
-  mirror_left_half(mesh, points);
+  mirror_right_half(mesh, points);
   smooth_seams(mesh, points);
-  mirror_left_half(mesh, points);
+  mirror_right_half(mesh, points);
   return points;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <set>
+#include <stdexcept>
 
 namespace q3d::smal {
 namespace {
@@ -28,6 +29,8 @@ class MeshBuilder {
     }
     pair_body();
     for (const Tube& tube : kTubes) pair_tube(tube);
+    for (std::size_t v = 0; v < mesh_.vertices.size(); ++v)
+      mesh_.half.push_back(half_of(static_cast<int>(v)));
     join_body();
     for (const Tube& tube : kTubes) join_tube(tube);
     mirror_faces();
@@ -112,23 +115,22 @@ class MeshBuilder {
   }
 
   // +1 right, 0 on the middle, -1 left.
-  int half(int vertex) const {
+  int half_of(int vertex) const {
     const auto v = static_cast<std::size_t>(vertex);
     if (mesh_.mirror[v] == vertex) return 0;
     const MeshVertex& at = mesh_.vertices[v];
     if (!is_middle(at.part)) return at.part < mirror_part(at.part) ? 1 : -1;
     int side = at.side;
     if (at.part != Part::body) {
-      const Hole& hole =
-          std::find_if(kTubes.begin(), kTubes.end(), [&](const Tube& t) { return t.part == at.part; })->hole;
-      side = wrapped_side(hole_border(hole)[static_cast<std::size_t>(at.side)][1]);
+      side = wrapped_side(hole_border(tube_of(at.part).hole)[static_cast<std::size_t>(at.side)][1]);
     }
     return side < kBodySides / 2 ? 1 : -1;
   }
 
   // Only the right half is joined; mirror_faces makes the other.
   void add_face(int a, int b, int c) {
-    if (half(a) >= 0 && half(b) >= 0 && half(c) >= 0) mesh_.faces.push_back({a, b, c});
+    const auto on_right = [this](int vertex) { return mesh_.half[static_cast<std::size_t>(vertex)] >= 0; };
+    if (on_right(a) && on_right(b) && on_right(c)) mesh_.faces.push_back({a, b, c});
   }
 
   void add_quad(int a, int b, int c, int d) {
@@ -159,11 +161,7 @@ class MeshBuilder {
   }
 
   void join_tube(const Tube& tube) {
-    std::vector<int> above;
-    for (const auto& [ring, side] : hole_border(tube.hole)) {
-      above.push_back(mesh_.rings_of(
-          Part::body)[static_cast<std::size_t>(ring)][static_cast<std::size_t>(wrapped_side(side))]);
-    }
+    std::vector<int> above = border_vertices(mesh_, tube.hole);
     for (const auto& row : mesh_.rings_of(tube.part)) {
       for (std::size_t side = 0; side < row.size(); ++side) {
         const std::size_t next = (side + 1) % row.size();
@@ -231,6 +229,19 @@ std::vector<std::array<int, 2>> hole_border(const Hole& hole) {
   for (int ring = hole.last_ring; ring > hole.first_ring; --ring) border.push_back({ring, hole.last_side});
   for (int side = hole.last_side; side > hole.first_side; --side) border.push_back({hole.first_ring, side});
   return border;
+}
+
+std::vector<int> border_vertices(const QuadrupedMesh& mesh, const Hole& hole) {
+  std::vector<int> vertices;
+  for (const auto& [ring, side] : hole_border(hole)) vertices.push_back(mesh.body_vertex(ring, side));
+  return vertices;
+}
+
+const Tube& tube_of(Part part) {
+  for (const Tube& tube : kTubes) {
+    if (tube.part == part || mirror_part(tube.part) == part) return tube;
+  }
+  throw std::invalid_argument("tube_of: the body is not a tube");
 }
 
 }  // namespace q3d::smal

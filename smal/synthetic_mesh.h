@@ -64,6 +64,7 @@ struct QuadrupedMesh {
   std::vector<MeshVertex> vertices;
   std::vector<std::array<int, 3>> faces;  // counter-clockwise from outside
   std::vector<int> mirror;                // the vertex on the other side; itself on the middle
+  std::vector<int> half;                  // 1 right, 0 on the middle, -1 left
   std::array<std::vector<std::vector<int>>, kNumParts> rings;  // [part][ring][side], -1 inside a hole
   std::array<int, kNumParts> end_pole;                         // nose, toes, tips
   int rear_pole;                                               // of the body
@@ -71,6 +72,11 @@ struct QuadrupedMesh {
 
   const std::vector<std::vector<int>>& rings_of(Part part) const {
     return rings[static_cast<std::size_t>(part)];
+  }
+  // Any side, counted round the ring in either direction; -1 inside a hole.
+  int body_vertex(int ring, int side) const {
+    return rings_of(Part::body)[static_cast<std::size_t>(ring)]
+                               [static_cast<std::size_t>((side + kBodySides) % kBodySides)];
   }
   int pole_of(Part part) const { return end_pole[static_cast<std::size_t>(part)]; }
 };
@@ -81,7 +87,11 @@ QuadrupedMesh make_quadruped_mesh();
 // The part on the other side; middle parts are their own.
 Part mirror_part(Part part);
 
-// The border of a hole as (ring, side) pairs of the body, in the order of the tube's ring.
+// The border of a hole as (ring, side) pairs of the body, in the order of the tube's ring; and its vertices.
 std::vector<std::array<int, 2>> hole_border(const Hole& hole);
+std::vector<int> border_vertices(const QuadrupedMesh& mesh, const Hole& hole);
+
+// The tube that a part is, or the mirror image of; the body is none.
+const Tube& tube_of(Part part);
 
 }  // namespace q3d::smal

@@ -1,161 +1,85 @@
 #include "smal/synthetic_skeleton.h"
 
-#include <algorithm>
 #include <cmath>
 
 namespace q3d::smal {
 namespace {
 
-// Every side of a ring.
-constexpr int kAllSides = -1;
+constexpr double kTailBone = 18.0 / 7.0;  // rings to a bone of the tail
 
-// Some vertices of the mesh: sides [first_side, last_side] of a ring, which may lie between two rings.
-struct Place {
-  Part part;
-  double ring;
-  int first_side = kAllSides;
-  int last_side = kAllSides;
-};
-
-struct WeightedPlace {
-  Place place;
-  double weight;
-};
-
-// Where the joints of the right half and the middle lie. The hips and shoulders are inside the trunk, half
-// way between the limb's first ring and the flank above it.
-std::vector<WeightedPlace> joint_places(int joint) {
-  const auto body = [](double ring) -> std::vector<WeightedPlace> { return {{{Part::body, ring}, 1.0}}; };
-  const auto tube = [](Part part, double ring) -> std::vector<WeightedPlace> {
-    return {{{part, ring}, 1.0}};
-  };
-  switch (joint) {
-    case 0:
-      return body(5);
-    case 1:
-      return body(8);
-    case 2:
-      return body(12);
-    case 3:
-      return body(16);
-    case 4:
-      return body(20);
-    case 5:
-      return body(25);
-    case 6:
-      return body(30);
-    case 11:
-      return {{{Part::right_foreleg, 0}, 0.5}, {{Part::body, 30, 4, 8}, 0.5}};
-    case 12:
-      return tube(Part::right_foreleg, 3);
-    case 13:
-      return tube(Part::right_foreleg, 9);
-    case 14:
-      return tube(Part::right_foreleg, 14);
-    case 15:
-      return body(34);
-    case 16:
-      return body(42);
-    case 21:
-      return {{{Part::right_hindleg, 0}, 0.5}, {{Part::body, 5, 4, 8}, 0.5}};
-    case 22:
-      return tube(Part::right_hindleg, 4);
-    case 23:
-      return tube(Part::right_hindleg, 10);
-    case 24:
-      return tube(Part::right_hindleg, 14);
-    // The jaw's hinge: low on both cheeks.
-    case 32:
-      return {{{Part::body, 45, 11, 12}, 0.5}, {{Part::body, 45, 20, 21}, 0.5}};
-    case 34:
-      return tube(Part::right_ear, 0);
-    default:
-      return tube(Part::tail, (joint - 25) * 18.0 / 7.0);
-  }
+// The mean of some vertices of a ring, as a row of the regressor.
+void add_mean(const std::vector<int>& vertices, double weight, Eigen::MatrixXd& regressor, int joint) {
+  for (const int vertex : vertices) regressor(joint, vertex) += weight / static_cast<double>(vertices.size());
 }
 
-// The joint on the other side; middle joints are their own.
-int mirror_joint(int joint) {
-  if (joint >= 7 && joint <= 14) return joint <= 10 ? joint + 4 : joint - 4;
-  if (joint >= 17 && joint <= 24) return joint <= 20 ? joint + 4 : joint - 4;
-  if (joint >= 33) return joint == 33 ? 34 : 33;
-  return joint;
-}
-
-bool is_left(int joint) {
-  return mirror_joint(joint) > joint;
-}
-
-// The vertices of one ring at a place. Of a body ring with a hole, only pairs at equal heights over and under
-// the middle are taken, so that the mean stays in the ring's centre.
-std::vector<int> ring_vertices(const QuadrupedMesh& mesh, const Place& place, int ring) {
-  const auto& row = mesh.rings_of(place.part)[static_cast<std::size_t>(ring)];
-  const bool whole = place.first_side == kAllSides;
-  const int first = whole ? 0 : place.first_side;
-  const int last = whole ? static_cast<int>(row.size()) - 1 : place.last_side;
+// A ring's vertices. Of a body ring with a hole only pairs at equal heights over and under its middle are
+// taken, so that their mean stays in the ring's centre.
+std::vector<int> ring_vertices(const QuadrupedMesh& mesh, Part part, int ring) {
+  const auto& row = mesh.rings_of(part)[static_cast<std::size_t>(ring)];
+  if (part != Part::body) return row;
   std::vector<int> vertices;
-  for (int side = first; side <= last; ++side) {
-    const int opposite = (kBodySides / 2 - side + kBodySides) % kBodySides;
-    const bool paired = place.part != Part::body || !whole || row[static_cast<std::size_t>(opposite)] >= 0;
-    const int vertex = row[static_cast<std::size_t>(side)];
-    if (vertex >= 0 && paired) vertices.push_back(vertex);
+  for (int side = 0; side < kBodySides; ++side) {
+    const int opposite = mesh.body_vertex(ring, kBodySides / 2 - side);
+    if (mesh.body_vertex(ring, side) >= 0 && opposite >= 0) vertices.push_back(mesh.body_vertex(ring, side));
   }
   return vertices;
 }
 
-void add_mean(const QuadrupedMesh& mesh, const WeightedPlace& at, bool mirrored, Eigen::MatrixXd& regressor,
+// Sides [first, last] of a body ring, right of the back, or their mirror image.
+std::vector<int> flank_vertices(const QuadrupedMesh& mesh, int ring, int first, int last, bool left) {
+  std::vector<int> vertices;
+  for (int side = first; side <= last; ++side)
+    vertices.push_back(mesh.body_vertex(ring, left ? -side : side));
+  return vertices;
+}
+
+void add_ring(const QuadrupedMesh& mesh, const JointSpec& spec, double weight, Eigen::MatrixXd& regressor,
               int joint) {
-  const int lower = static_cast<int>(std::floor(at.place.ring));
-  const double above = at.place.ring - lower;
-  for (const auto& [ring, share] : {std::pair(lower, 1.0 - above), std::pair(lower + 1, above)}) {
-    if (share == 0.0) continue;
-    const std::vector<int> vertices = ring_vertices(mesh, at.place, ring);
-    for (const int vertex : vertices) {
-      const int column = mirrored ? mesh.mirror[static_cast<std::size_t>(vertex)] : vertex;
-      regressor(joint, column) += at.weight * share / static_cast<double>(vertices.size());
-    }
-  }
+  const int lower = static_cast<int>(std::floor(spec.ring));
+  const double above = spec.ring - lower;
+  add_mean(ring_vertices(mesh, spec.part, lower), weight * (1.0 - above), regressor, joint);
+  if (above > 0.0) add_mean(ring_vertices(mesh, spec.part, lower + 1), weight * above, regressor, joint);
 }
 
 }  // namespace
 
-const std::array<JointName, kNumJoints>& synthetic_joints() {
-  static constexpr std::array<JointName, kNumJoints> kJoints = {{
-      {"root", -1},             // 0: hips
-      {"spine_1", 0},           // 1: the back, from the hips to the withers
-      {"spine_2", 1},           // 2
-      {"spine_3", 2},           // 3
-      {"spine_4", 3},           // 4
-      {"spine_5", 4},           // 5
-      {"spine_6", 5},           // 6: withers
-      {"left_shoulder", 6},     // 7
-      {"left_elbow", 7},        // 8
-      {"left_carpus", 8},       // 9
-      {"left_fore_foot", 9},    // 10
-      {"right_shoulder", 6},    // 11
-      {"right_elbow", 11},      // 12
-      {"right_carpus", 12},     // 13
-      {"right_fore_foot", 13},  // 14
-      {"neck", 6},              // 15
-      {"head", 15},             // 16
-      {"left_hip", 0},          // 17
-      {"left_stifle", 17},      // 18
-      {"left_hock", 18},        // 19
-      {"left_hind_foot", 19},   // 20
-      {"right_hip", 0},         // 21
-      {"right_stifle", 21},     // 22
-      {"right_hock", 22},       // 23
-      {"right_hind_foot", 23},  // 24
-      {"tail_1", 0},            // 25
-      {"tail_2", 25},           // 26
-      {"tail_3", 26},           // 27
-      {"tail_4", 27},           // 28
-      {"tail_5", 28},           // 29
-      {"tail_6", 29},           // 30
-      {"tail_7", 30},           // 31
-      {"jaw", 16},              // 32
-      {"left_ear", 16},         // 33
-      {"right_ear", 16},        // 34
+const std::array<JointSpec, kNumJoints>& synthetic_joints() {
+  static constexpr std::array<JointSpec, kNumJoints> kJoints = {{
+      {"root", -1, Part::body, 5, 0},  // 0: hips
+      {"spine_1", 0, Part::body, 8, 2.5},
+      {"spine_2", 1, Part::body, 12, 3},
+      {"spine_3", 2, Part::body, 16, 3},
+      {"spine_4", 3, Part::body, 20, 3},
+      {"spine_5", 4, Part::body, 25, 4},
+      {"spine_6", 5, Part::body, 30, 4},  // 6: withers
+      {"left_shoulder", 6, Part::left_foreleg, 0, 0},
+      {"left_elbow", 7, Part::left_foreleg, 3, 2.2},
+      {"left_carpus", 8, Part::left_foreleg, 9, 2},
+      {"left_fore_foot", 9, Part::left_foreleg, 14, 1.6},
+      {"right_shoulder", 6, Part::right_foreleg, 0, 0},  // 11
+      {"right_elbow", 11, Part::right_foreleg, 3, 2.2},
+      {"right_carpus", 12, Part::right_foreleg, 9, 2},
+      {"right_fore_foot", 13, Part::right_foreleg, 14, 1.6},
+      {"neck", 6, Part::body, 34, 4},  // 15
+      {"head", 15, Part::body, 42, 3.5},
+      {"left_hip", 0, Part::left_hindleg, 0, 0},  // 17
+      {"left_stifle", 17, Part::left_hindleg, 4, 2.4},
+      {"left_hock", 18, Part::left_hindleg, 10, 1.8},
+      {"left_hind_foot", 19, Part::left_hindleg, 14, 1.4},
+      {"right_hip", 0, Part::right_hindleg, 0, 0},  // 21
+      {"right_stifle", 21, Part::right_hindleg, 4, 2.4},
+      {"right_hock", 22, Part::right_hindleg, 10, 1.8},
+      {"right_hind_foot", 23, Part::right_hindleg, 14, 1.4},
+      {"tail_1", 0, Part::tail, 0, 0},  // 25
+      {"tail_2", 25, Part::tail, kTailBone, 1.4},
+      {"tail_3", 26, Part::tail, 2 * kTailBone, 1.4},
+      {"tail_4", 27, Part::tail, 3 * kTailBone, 1.4},
+      {"tail_5", 28, Part::tail, 4 * kTailBone, 1.4},
+      {"tail_6", 29, Part::tail, 5 * kTailBone, 1.4},
+      {"tail_7", 30, Part::tail, 6 * kTailBone, 1.4},
+      {"jaw", 16, Part::jaw, 0, 0},  // 32
+      {"left_ear", 16, Part::left_ear, 0, 0},
+      {"right_ear", 16, Part::right_ear, 0, 0},
   }};
   return kJoints;
 }
@@ -164,9 +88,20 @@ Eigen::MatrixXd joint_regressor(const QuadrupedMesh& mesh) {
   Eigen::MatrixXd regressor =
       Eigen::MatrixXd::Zero(kNumJoints, static_cast<Eigen::Index>(mesh.vertices.size()));
   for (int joint = 0; joint < kNumJoints; ++joint) {
-    const bool left = is_left(joint);
-    for (const WeightedPlace& at : joint_places(left ? mirror_joint(joint) : joint)) {
-      add_mean(mesh, at, left, regressor, joint);
+    const JointSpec& spec = synthetic_joints()[static_cast<std::size_t>(joint)];
+    const bool foreleg = spec.part == Part::left_foreleg || spec.part == Part::right_foreleg;
+    const bool hindleg = spec.part == Part::left_hindleg || spec.part == Part::right_hindleg;
+    if (spec.part == Part::jaw) {  // its hinge: low on both cheeks
+      for (const bool left : {false, true})
+        add_mean(flank_vertices(mesh, 45, 11, 12, left), 0.5, regressor, joint);
+    } else if ((foreleg || hindleg) && spec.ring == 0) {
+      // Shoulders and hips lie inside the trunk, half way between the limb's first ring and the flank above
+      // it.
+      const bool left = spec.part == Part::left_foreleg || spec.part == Part::left_hindleg;
+      add_ring(mesh, spec, 0.5, regressor, joint);
+      add_mean(flank_vertices(mesh, foreleg ? 30 : 5, 4, 8, left), 0.5, regressor, joint);
+    } else {
+      add_ring(mesh, spec, 1.0, regressor, joint);
     }
   }
   return regressor;

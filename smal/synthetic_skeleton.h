@@ -11,13 +11,16 @@
 
 namespace q3d::smal {
 
-struct JointName {
+struct JointSpec {
   const char* name;
   std::int32_t parent;
+  Part part;     // the part of the mesh that the joint moves
+  double ring;   // where on it the joint lies
+  double blend;  // rings on either side over which it takes over from the joint before it on the same part
 };
 
 // SMAL's 35 joints: parents before children, the root at the hips.
-const std::array<JointName, kNumJoints>& synthetic_joints();
+const std::array<JointSpec, kNumJoints>& synthetic_joints();
 
 // (35, V): each joint is a weighted mean of the mesh rings around it; rows are non-negative and sum to 1.
 Eigen::MatrixXd joint_regressor(const QuadrupedMesh& mesh);

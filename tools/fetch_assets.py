@@ -15,9 +15,10 @@ import re
 import urllib.error
 import urllib.request
 from dataclasses import dataclass
-from typing import Callable, Optional
+from typing import Callable, Optional, Sequence
 
 import prima_import
+import safetensors_file
 import smal_import
 
 HUB = os.environ.get("HF_ENDPOINT", "https://huggingface.co").rstrip("/")  # HF_ENDPOINT: the hub's name for a mirror
@@ -74,7 +75,7 @@ def run(folder: str, stage: str, training: bool, offline: bool, say: Say) -> int
         target = os.path.join(folder, name)
         if None in sources:
             continue
-        if os.path.exists(target) and os.stat(target).st_mtime >= max(os.stat(path).st_mtime for path in sources):
+        if _is_made_of(target, sources):
             say(f"{target}: up to date")
         else:
             importer(*sources, target, say)
@@ -84,6 +85,15 @@ def run(folder: str, stage: str, training: bool, offline: bool, say: Say) -> int
             say(f"  {store.path(asset.names[0])}: {asset.meaning}, from {HUB}/{asset.repository}")
         say("and run `make assets` again.")
     return 1 if store.missing else 0
+
+
+def _is_made_of(target: str, sources: Sequence[str]) -> bool:
+    """True when `target` names these files as its sources and is no older than they are."""
+    if not os.path.exists(target):
+        return False
+    made_of = safetensors_file.read(target)[1].get(safetensors_file.SOURCE_KEY)
+    newest = max(os.stat(path).st_mtime for path in sources)
+    return made_of == safetensors_file.source_names(sources) and os.stat(target).st_mtime >= newest
 
 
 class Store:

@@ -114,26 +114,37 @@ By hand:
 Exit codes: 0 done, 1 a file cannot be used (the message says why), 2 wrong usage, 130 stopped.""",
     )
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    _add_checkpoint(commands)
+    _add_smal(commands)
+    _add_priors(commands)
+    _add_parts(commands)
+    _add_fetch(commands)
+    return parser
 
-    def command(name: str, run, summary: str, example: str) -> argparse.ArgumentParser:
-        added = commands.add_parser(
-            name,
-            help=summary,
-            description=summary[0].upper() + summary[1:] + ".",
-            epilog="Example:\n" + example,
-            formatter_class=argparse.RawDescriptionHelpFormatter,
-        )
-        added.set_defaults(run=run)
-        return added
 
-    def weights(added: argparse.ArgumentParser, what: str) -> None:
-        added.add_argument("input", metavar="IN", help=what)
-        added.add_argument("output", metavar="OUT", help="safetensors file to write")
-        added.add_argument(
-            "--skip-crc", action="store_true", help="do not compare the zip's check sums (files saved without them)"
-        )
+def _command(commands, name: str, run, summary: str, example: str) -> argparse.ArgumentParser:
+    added = commands.add_parser(
+        name,
+        help=summary,
+        description=summary[0].upper() + summary[1:] + ".",
+        epilog="Example:\n" + example,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    added.set_defaults(run=run)
+    return added
 
-    added = command(
+
+def _add_weight_files(added: argparse.ArgumentParser, what: str) -> None:
+    added.add_argument("input", metavar="IN", help=what)
+    added.add_argument("output", metavar="OUT", help="safetensors file to write")
+    added.add_argument(
+        "--skip-crc", action="store_true", help="do not compare the zip's check sums (files saved without them)"
+    )
+
+
+def _add_checkpoint(commands) -> None:
+    added = _command(
+        commands,
         "checkpoint",
         _checkpoint,
         "import the network from a Lightning checkpoint",
@@ -145,14 +156,17 @@ heads, IEF iterations, focal length, quick GELU) comes from --set, --config, the
 official values, in this order; the output says which:
   import_assets.py checkpoint mine.ckpt mine.safetensors --set heads=4 --set dec_heads=4 --set clip_heads=4""",
     )
-    weights(added, "Lightning checkpoint (*.ckpt)")
+    _add_weight_files(added, "Lightning checkpoint (*.ckpt)")
     added.add_argument("--open-clip-config", metavar="JSON", help="BioCLIP's open_clip_config.json: quick GELU, heads")
     added.add_argument("--config", metavar="JSON", help="file with config values, for example {\"ief_iterations\": 3}")
     added.add_argument("--set", type=_setting, action="append", default=[], metavar="KEY=VALUE", help="one such value")
     added.add_argument("--keep-text", action="store_true", help="keep CLIP's text tower, which nothing uses (254 MB)")
     added.add_argument("--drop", action="append", default=[], metavar="PREFIX", help="leave out unknown tensors")
 
-    added = command(
+
+def _add_smal(commands) -> None:
+    added = _command(
+        commands,
         "smal",
         _smal,
         "import the SMAL body model",
@@ -163,7 +177,10 @@ Reads the released Python 2 pickle (chumpy, scipy) and adds the vertex groups of
     added.add_argument("input", metavar="IN", help="my_smpl_00781_4_all.pkl")
     added.add_argument("output", metavar="OUT", help="safetensors file to write")
 
-    added = command(
+
+def _add_priors(commands) -> None:
+    added = _command(
+        commands,
         "priors",
         _priors,
         "import the shape families and the pose prior",
@@ -174,7 +191,10 @@ Reads the released Python 2 pickle (chumpy, scipy) and adds the vertex groups of
     added.add_argument("pose", metavar="POSE", help="walking_toy_symmetric_pose_prior_with_cov_35parts.pkl")
     added.add_argument("output", metavar="OUT", help="safetensors file to write")
 
-    added = command(
+
+def _add_parts(commands) -> None:
+    added = _command(
+        commands,
         "bioclip",
         _bioclip,
         "put an OpenCLIP image tower into a checkpoint",
@@ -185,11 +205,12 @@ Reads the released Python 2 pickle (chumpy, scipy) and adds the vertex groups of
 For training from scratch; the official checkpoint holds its BioCLIP already. Whether the tower uses quick GELU, and
 its number of heads, come from open_clip_config.json.""",
     )
-    weights(added, "open_clip_pytorch_model.bin or open_clip_model.safetensors")
+    _add_weight_files(added, "open_clip_pytorch_model.bin or open_clip_model.safetensors")
     added.add_argument("--open-clip-config", required=True, metavar="JSON", help="open_clip_config.json beside it")
     added.add_argument("--into", required=True, metavar="CHECKPOINT", help="safetensors checkpoint with all the rest")
 
-    added = command(
+    added = _command(
+        commands,
         "backbone",
         _backbone,
         "put AniMer's ViT into a checkpoint",
@@ -197,10 +218,13 @@ its number of heads, come from open_clip_config.json.""",
 
 For training from scratch, as in the paper. Only backbone.* is taken.""",
     )
-    weights(added, "AniMer checkpoint (amr_vitbb.pth)")
+    _add_weight_files(added, "AniMer checkpoint (amr_vitbb.pth)")
     added.add_argument("--into", required=True, metavar="CHECKPOINT", help="safetensors checkpoint with all the rest")
 
-    added = command(
+
+def _add_fetch(commands) -> None:
+    added = _command(
+        commands,
         "fetch",
         _fetch,
         "download what is missing, verify it and import it (make assets)",
@@ -212,9 +236,8 @@ Without a network it says which files to put where. The files have licences of t
     )
     added.add_argument("--folder", default="assets", help="where the results go (default: assets)")
     added.add_argument("--stage", choices=("1", "3"), default="1", help="which network (default: 1, the dataset's)")
-    added.add_argument("--training", action="store_true", help="also fetch AniMer's backbone")
+    added.add_argument("--training", action="store_true", help="also fetch AniMer's ViT and BioCLIP's weights")
     added.add_argument("--offline", action="store_true", help="download nothing")
-    return parser
 
 
 if __name__ == "__main__":

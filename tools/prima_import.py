@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections import Counter
 from typing import Callable, Mapping, Optional, Sequence
 
@@ -206,7 +205,10 @@ def _load(path: str, check_sums: bool) -> dict[str, Tensor]:
     return file.tensors((_entries(file.root) or {}).get("state_dict", file.root), "state_dict")
 
 
-def _merge(source, found, base, target, prefix: str, sizes: Mapping, say: Say, ignored: int) -> None:
+def _merge(
+    source: str, found: dict, base: str, target: str, prefix: str, sizes: Mapping, say: Say, ignored: int
+) -> None:
+    """Writes `base` with `found` in the place of its tensors prefix*, and with `sizes` in its config."""
     tensors, metadata = safetensors_file.read(base)
     try:
         config = names.OFFICIAL_CONFIG | json.loads(metadata[CONFIG_KEY])
@@ -228,7 +230,7 @@ def _merge(source, found, base, target, prefix: str, sizes: Mapping, say: Say, i
     if faults := find_faults({name: merged[name] for name in network if name in merged}, network):
         raise ImportFault(_fault_list(base, faults, f"The rest of it does not fit {source}."))
     order = [name for name in expected if name in merged] + [name for name in merged if name not in expected]
-    safetensors_file.write(target, {name: merged[name] for name in order}, metadata | _metadata(config, source))
+    safetensors_file.write(target, {name: merged[name] for name in order}, metadata | {CONFIG_KEY: json.dumps(config)})
     say(f"{target}: {len(wanted)} tensors {prefix}* from {source}, {len(merged) - len(wanted)} from {base}")
     if ignored:
         say(f"  not used: {ignored} other tensors of {source}")
@@ -240,7 +242,7 @@ def _merge(source, found, base, target, prefix: str, sizes: Mapping, say: Say, i
 
 
 def _metadata(config: Mapping, source: str) -> dict[str, str]:
-    return {CONFIG_KEY: json.dumps(config), "imported_from": os.path.basename(source)}
+    return {CONFIG_KEY: json.dumps(config), safetensors_file.SOURCE_KEY: safetensors_file.source_names([source])}
 
 
 def _fault_list(path: str, faults: list[str], advice: str) -> str:

@@ -16,6 +16,7 @@ import numpy as np
 ITEM_BYTES = {"F64": 8, "F32": 4, "F16": 2, "BF16": 2, "I64": 8, "I32": 4, "I16": 2, "I8": 1, "U8": 1, "BOOL": 1}
 CHUNK_BYTES = 8 << 20
 MAX_HEADER_BYTES = 100_000_000  # the format's own limit
+SOURCE_KEY = "imported_from"  # in the metadata of every imported file
 
 _NUMPY_NAMES = {"float64": "F64", "float32": "F32", "float16": "F16", "int64": "I64", "int32": "I32", "bool": "BOOL"}
 
@@ -44,6 +45,11 @@ def from_array(values: np.ndarray) -> Tensor:
     """Keeps a reference to the array; its numbers are written little-endian."""
     values = np.asarray(values, values.dtype.newbyteorder("<"), order="C")
     return Tensor(_NUMPY_NAMES[values.dtype.name], values.shape, lambda: [values.reshape(-1).view(np.uint8).data])
+
+
+def source_names(paths: Iterable[str]) -> str:
+    """The value of SOURCE_KEY."""
+    return ", ".join(os.path.basename(path) for path in paths)
 
 
 def walk(view: memoryview) -> Iterator[memoryview]:

@@ -49,8 +49,7 @@ def import_body(source: str, target: str, say: Say) -> None:
     }
     for name in ("J_regressor", "lbs_weights"):
         _check_rows_sum_to_one(f"{source}: {name}", tensors[name])
-    metadata = {"format": BODY_FORMAT, "name": "SMAL, from " + os.path.basename(source), "licence": LICENCE}
-    _write(target, tensors, metadata)
+    _write(target, tensors, {"format": BODY_FORMAT, "name": "SMAL"}, [source])
     say(
         f"{target}: {VERTICES} vertices, {FACES} faces, {JOINTS} joints, {BETAS} shape directions"
         f" (of {shapedirs.shape[2]} in the file), {KEYPOINTS} keypoints\n  licence: {LICENCE}"
@@ -74,8 +73,7 @@ def import_priors(families_source: str, pose_source: str, target: str, say: Say)
         # The prior does not judge the global orientation, the first three numbers.
         "pose_prior_loss.use_index": np.array([0.0] * 3 + [1.0] * (3 * (JOINTS - 1)), np.float32),
     }
-    files = f"{os.path.basename(families_source)}, {os.path.basename(pose_source)}"
-    _write(target, tensors, {"format": PRIORS_FORMAT, "name": "SMAL priors, from " + files, "licence": LICENCE})
+    _write(target, tensors, {"format": PRIORS_FORMAT, "name": "SMAL priors"}, [families_source, pose_source])
     say(f"{target}: {FAMILIES} shape families of {BETAS} betas, a pose prior of {JOINTS} parts\n  licence: {LICENCE}")
 
 
@@ -105,9 +103,11 @@ class _Table:
         if not matches:
             expected = ", ".join("any" if size is None else str(size) for size in shape)
             raise BrokenPickle(f"{self.path}: {name} has the shape {list(values.shape)}, expected [{expected}]")
+        with np.errstate(over="ignore"):  # becomes infinite, which is reported
+            values = np.asarray(values, dtype, order="C")
         if not np.isfinite(values).all():
-            raise BrokenPickle(f"{self.path}: {name} holds a number that is not finite")
-        return np.asarray(values, dtype, order="C")
+            raise BrokenPickle(f"{self.path}: {name} holds a number that is not finite in {values.dtype}")
+        return values
 
     def indices(self, name: str, shape: Sequence, limit: int) -> np.ndarray:
         values = self.numbers(name, shape, np.float64)  # exact for every index that is allowed
@@ -129,15 +129,15 @@ class _Table:
 def _parents(table: _Table) -> np.ndarray:
     """Row 0 of the kinematic table. The root's parent is -1, which unsigned 32-bit numbers show as 4294967295."""
     parents = table.numbers("kintree_table", (2, JOINTS), np.float64)[0]
-    parents = np.where(parents == 4294967295, -1, parents).astype(np.int32)
-    before = [0 <= parent < joint for joint, parent in enumerate(parents)]
+    parents = np.where(parents == 4294967295, -1, parents)
+    before = [0 <= parent < joint and parent % 1 == 0 for joint, parent in enumerate(parents)]
     if parents[0] != -1 or not all(before[1:]):
         joint = 0 if parents[0] != -1 else before.index(False, 1)
         raise BrokenPickle(
-            f"{table.path}: kintree_table gives joint {joint} the parent {parents[joint]}, expected "
+            f"{table.path}: kintree_table gives joint {joint} the parent {parents[joint]:g}, expected "
             + ("-1 (or 4294967295) for the root" if joint == 0 else f"one of 0 to {joint - 1}")
         )
-    return parents
+    return parents.astype(np.int32)
 
 
 def _check_rows_sum_to_one(what: str, rows: np.ndarray, tolerance: float = 1e-3) -> None:
@@ -170,6 +170,7 @@ def _keypoint_groups() -> list[list[int]]:
         return [entry["vertices"] for entry in json.load(file)["keypoints"]]
 
 
-def _write(target: str, tensors: dict[str, np.ndarray], metadata: dict[str, str]) -> None:
+def _write(target: str, tensors: dict[str, np.ndarray], metadata: dict[str, str], sources: Sequence[str]) -> None:
     entries = {name: safetensors_file.from_array(values) for name, values in tensors.items()}
+    metadata |= {"licence": LICENCE, safetensors_file.SOURCE_KEY: safetensors_file.source_names(sources)}
     safetensors_file.write(target, entries, metadata)

@@ -24,19 +24,22 @@ struct Arguments {
 Command add_sample(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   world::WorldOptions& options = arguments->world;
-  CLI::App* command = app.add_subcommand("sample", "render a world of quadrupeds with known truth, in native layouts");
+  CLI::App* command =
+      app.add_subcommand("sample", "render a world of quadrupeds with known truth, in native layouts");
   command->add_option("-o,--out", options.out, "folder to make")->required();
   command->add_option("--seed", options.seed, "the same seed gives the same bytes")->capture_default_str();
   command->add_option("--share", options.share, "of the default number of pictures")->capture_default_str();
   command->add_option("--pixels", options.picture_px, "longer side of a photograph")->capture_default_str();
-  command->add_option("-t,--threads", options.threads, "0 = all cores; never changes a byte")->capture_default_str();
+  command->add_option("-t,--threads", options.threads, "0 = all cores; never changes a byte")
+      ->capture_default_str();
   command->add_flag("--json", arguments->json, "print a machine-readable summary on stdout");
   command->add_flag("-q,--quiet", arguments->quiet, "no progress");
   command->footer(
       "Examples:\n"
       "  quadruped3d sample --out data/world --share 0.08     a few hundred pictures\n"
       "  quadruped3d sample --out data/world                  the whole world\n"
-      "Writes animal3d/, control_animal3dlatest/, superanimal_quadruped/ and animal_kingdom/ as their users have them,\n"
+      "Writes animal3d/, control_animal3dlatest/, superanimal_quadruped/ and animal_kingdom/ as their users "
+      "have them,\n"
       "the hidden truth of the 2D-only sets in truth/, and the synthetic SMAL asset in assets/.");
   return [arguments] {
     world::WorldOptions& wanted = arguments->world;
@@ -54,9 +57,8 @@ Command add_sample(CLI::App& app) {
     fmt::print(stderr, "{} pictures in {}{}\n", summary.total, wanted.out.string(),
                summary.reused ? " (they were there already)" : "");
     if (arguments->json) {
-      const nlohmann::ordered_json document = {{"pictures", summary.pictures},
-                                               {"total", summary.total},
-                                               {"smal_asset", summary.asset.string()}};
+      const nlohmann::ordered_json document = {
+          {"pictures", summary.pictures}, {"total", summary.total}, {"smal_asset", summary.asset.string()}};
       fmt::print("{}\n", document.dump());
     }
     return 0;

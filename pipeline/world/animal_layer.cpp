@@ -27,7 +27,8 @@ std::vector<Eigen::Vector3f> vertex_normals(std::span<const Eigen::Vector3f> ver
 }
 
 // The pixels that may show the animal.
-cv::Rect projected_rect(std::span<const Eigen::Vector3f> vertices, const PictureCamera& camera, cv::Size size) {
+cv::Rect projected_rect(std::span<const Eigen::Vector3f> vertices, const PictureCamera& camera,
+                        cv::Size size) {
   double left = size.width, top = size.height, right = 0.0, bottom = 0.0;
   for (const Eigen::Vector3f& vertex : vertices) {
     const Eigen::Vector2d p = camera.project(vertex);
@@ -42,7 +43,9 @@ cv::Rect projected_rect(std::span<const Eigen::Vector3f> vertices, const Picture
   return last.x > first.x && last.y > first.y ? cv::Rect(first, last) : cv::Rect();
 }
 
-Colour square_root(const Colour& linear) { return linear.max(0.0F).sqrt(); }
+Colour square_root(const Colour& linear) {
+  return linear.max(0.0F).sqrt();
+}
 
 }  // namespace
 
@@ -164,8 +167,9 @@ void AnimalLayer::cast_shadow(cv::Mat& picture, const PictureCamera& camera, con
   // Shadows are soft: a quarter of the pixels is enough.
   constexpr int kStep = 2;
   const cv::Size size((picture.cols + kStep - 1) / kStep, (picture.rows + kStep - 1) / kStep);
-  const Eigen::Vector3f centre = std::accumulate(vertices_.begin(), vertices_.end(), Eigen::Vector3f(0, 0, 0)) /
-                                 static_cast<float>(vertices_.size());
+  const Eigen::Vector3f centre =
+      std::accumulate(vertices_.begin(), vertices_.end(), Eigen::Vector3f(0, 0, 0)) /
+      static_cast<float>(vertices_.size());
   float radius = 0.0F;
   for (const Eigen::Vector3f& vertex : vertices_) radius = std::max(radius, (vertex - centre).norm());
 

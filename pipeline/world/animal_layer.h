@@ -19,16 +19,18 @@ class AnimalLayer {
               const Eigen::Vector3f& translation);
 
   // Darkens the ground (picture: BGR, 8 bit) where the sun or most of the sky is behind the animal.
-  void cast_shadow(cv::Mat& picture, const PictureCamera& camera, const Ground& ground, const Light& light) const;
+  void cast_shadow(cv::Mat& picture, const PictureCamera& camera, const Ground& ground,
+                   const Light& light) const;
 
   // Paints the animal over the picture, edges antialiased, and returns its silhouette: 255 where it covers at
   // least half of a pixel, else 0.
   cv::Mat1b paint(cv::Mat& picture, const PictureCamera& camera, const Ground& ground, const Light& light,
                   const CoatPainter& painter, const Coat& coat, const Eigen::Vector3f& individual) const;
 
-  // For points of the body (camera frame, with translation): 1 where the body itself stands before the point by
-  // more than its tolerance (SMAL units).
-  std::vector<std::uint8_t> hidden(std::span<const Eigen::Vector3f> points, std::span<const float> tolerance) const;
+  // For points of the body (camera frame, with translation): 1 where the body itself stands before the point
+  // by more than its tolerance (SMAL units).
+  std::vector<std::uint8_t> hidden(std::span<const Eigen::Vector3f> points,
+                                   std::span<const float> tolerance) const;
 
   const std::vector<Eigen::Vector3f>& vertices() const { return vertices_; }
 

@@ -20,8 +20,12 @@ double decimal(float value) {
   return result;
 }
 
-double rounded(double value, double step) { return std::round(value / step) * step; }
-double hundredth(double px) { return std::round(px * 100.0) / 100.0; }  // what annotation tools store
+double rounded(double value, double step) {
+  return std::round(value / step) * step;
+}
+double hundredth(double px) {
+  return std::round(px * 100.0) / 100.0;
+}  // what annotation tools store
 
 template <typename Range>
 json decimals(const Range& values) {
@@ -30,7 +34,9 @@ json decimals(const Range& values) {
   return result;
 }
 
-json vector3(const Eigen::Vector3f& p) { return {decimal(p.x()), decimal(p.y()), decimal(p.z())}; }
+json vector3(const Eigen::Vector3f& p) {
+  return {decimal(p.x()), decimal(p.y()), decimal(p.z())};
+}
 
 json points3(std::span<const Eigen::Vector3f> points) {
   json result = json::array();
@@ -50,7 +56,9 @@ const Species& species_of(const FinishedPicture& picture) {
   return species_table()[static_cast<std::size_t>(picture.plan.species)];
 }
 
-json xywh(const cv::Rect& box) { return {box.x, box.y, box.width, box.height}; }
+json xywh(const cv::Rect& box) {
+  return {box.x, box.y, box.width, box.height};
+}
 
 // The smallest box around the labelled points; empty when there are none.
 cv::Rect2d around(std::span<const Label> labels) {
@@ -73,7 +81,8 @@ json prima_annotations(std::span<const FinishedPicture> pictures, const std::str
     const PictureTruth& truth = picture.truth;
     json keypoints = json::array();
     for (const Label& label : truth.labels) {
-      keypoints.push_back(label.given ? json{hundredth(label.x_px), hundredth(label.y_px), 1.0} : json{0.0, 0.0, 0.0});
+      keypoints.push_back(label.given ? json{hundredth(label.x_px), hundredth(label.y_px), 1.0}
+                                      : json{0.0, 0.0, 0.0});
     }
     const auto betas = std::span(truth.posture.betas);
     const std::string folder = std::string(domain_of(picture.plan.set).folder) + "/";
@@ -95,7 +104,8 @@ json prima_annotations(std::span<const FinishedPicture> pictures, const std::str
   return {{"info", info}, {"data", std::move(data)}};
 }
 
-json superanimal_annotations(std::span<const FinishedPicture> pictures, const std::vector<Landmark>& landmarks) {
+json superanimal_annotations(std::span<const FinishedPicture> pictures,
+                             const std::vector<Landmark>& landmarks) {
   json images = json::array(), annotations = json::array(), names = json::array();
   for (const Landmark& landmark : landmarks) names.push_back(landmark.name);
   for (const FinishedPicture& picture : pictures) {
@@ -109,7 +119,8 @@ json superanimal_annotations(std::span<const FinishedPicture> pictures, const st
       labels[i].given = labels[i].given && covered;
       // SuperAnimal's converter turns a labelled point with a negative coordinate into a missing one.
       if (labels[i].given && labels[i].x_px >= 0.0 && labels[i].y_px >= 0.0) {
-        for (const double value : {hundredth(labels[i].x_px), hundredth(labels[i].y_px)}) keypoints.push_back(value);
+        for (const double value : {hundredth(labels[i].x_px), hundredth(labels[i].y_px)})
+          keypoints.push_back(value);
         keypoints.push_back(source.labelled_v);
       } else {
         const int code = covered && source.missing_is_zero ? 0 : -1;
@@ -142,7 +153,10 @@ json superanimal_annotations(std::span<const FinishedPicture> pictures, const st
   return {{"images", std::move(images)},
           {"annotations", std::move(annotations)},
           {"categories",
-           {{{"id", 1}, {"name", "superquadruped"}, {"supercategory", "animal"}, {"keypoints", std::move(names)},
+           {{{"id", 1},
+             {"name", "superquadruped"},
+             {"supercategory", "animal"},
+             {"keypoints", std::move(names)},
              {"skeleton", json::array()}}}}};
 }
 
@@ -176,17 +190,17 @@ json truth_annotations(std::span<const FinishedPicture> pictures) {
   for (const FinishedPicture& picture : pictures) {
     const PictureTruth& truth = picture.truth;
     const PictureCamera& camera = truth.framing.camera;
-    all[picture.plan.listed] = {{"species", species_of(picture).name},
-                                {"family", static_cast<int>(species_of(picture).family)},
-                                {"pose", decimals(truth.posture.pose)},
-                                {"betas", decimals(truth.posture.betas)},
-                                {"trans", vector3(truth.framing.translation)},
-                                {"camera", {{"focal_px", camera.focal_px},
-                                            {"center_px", {camera.centre_x_px, camera.centre_y_px}}}},
-                                {"bbox", xywh(truth.framing.box)},
-                                {"keypoint_2d", exact_points(truth.keypoints)},
-                                {"keypoint_3d", points3(truth.keypoints_3d)},
-                                {"mask_path", picture.plan.mask}};
+    all[picture.plan.listed] = {
+        {"species", species_of(picture).name},
+        {"family", static_cast<int>(species_of(picture).family)},
+        {"pose", decimals(truth.posture.pose)},
+        {"betas", decimals(truth.posture.betas)},
+        {"trans", vector3(truth.framing.translation)},
+        {"camera", {{"focal_px", camera.focal_px}, {"center_px", {camera.centre_x_px, camera.centre_y_px}}}},
+        {"bbox", xywh(truth.framing.box)},
+        {"keypoint_2d", exact_points(truth.keypoints)},
+        {"keypoint_3d", points3(truth.keypoints_3d)},
+        {"mask_path", picture.plan.mask}};
   }
   return {{"pictures", std::move(all)}};
 }

@@ -21,10 +21,14 @@ bool in_group(const std::string& name, int group) {
   static constexpr std::array<std::string_view, 4> kHind{"back_", "Knee", "Ankle", "Hip"};
   static constexpr std::array<std::string_view, 5> kFace{"eye", "Eye", "ear", "mouth", "Mouth"};
   switch (group) {
-    case 0: return contains_any(name, kFore);
-    case 1: return contains_any(name, kHind);
-    case 2: return contains_any(name, kFace);
-    default: return true;
+    case 0:
+      return contains_any(name, kFore);
+    case 1:
+      return contains_any(name, kHind);
+    case 2:
+      return contains_any(name, kFace);
+    default:
+      return true;
   }
 }
 
@@ -44,9 +48,8 @@ std::vector<Label> annotate(const std::vector<Landmark>& landmarks, std::span<co
     const double rate = seen[i].occluded      ? habits.occluded
                         : seen[i].self_hidden ? habits.self_hidden
                                               : habits.visible;
-    const double deviation =
-        habits.jitter * box_side_px * (landmarks[i].vague ? habits.vague_factor : 1.0) *
-        (seen[i].occluded || seen[i].self_hidden ? 1.5 : 1.0);  // a guess is less exact
+    const double deviation = habits.jitter * box_side_px * (landmarks[i].vague ? habits.vague_factor : 1.0) *
+                             (seen[i].occluded || seen[i].self_hidden ? 1.5 : 1.0);  // a guess is less exact
     const bool chosen = rng.chance(rate);
     const double dx = rng.normal(0.0, deviation), dy = rng.normal(0.0, deviation);
     labels[i] = {seen[i].px.x() + dx, seen[i].px.y() + dy, chosen && seen[i].exists && seen[i].inside};

@@ -14,7 +14,7 @@ namespace q3d::pipeline::world {
 struct SeenLandmark {
   Eigen::Vector2d px{0.0, 0.0};
   bool exists = false;
-  bool inside = false;     // of the picture
+  bool inside = false;       // of the picture
   bool self_hidden = false;  // behind the animal's own body
   bool occluded = false;     // behind something in front of the animal
 };

@@ -27,8 +27,8 @@ struct Painter {
   const NoiseField& noise;
   Rng& rng;
   float subject_distance;  // where the lens is focused
-  cv::Mat picture;       // BGR, 8 bit
-  cv::Mat1f distance;    // along the ray to the ground; -1 where there is none
+  cv::Mat picture;         // BGR, 8 bit
+  cv::Mat1f distance;      // along the ray to the ground; -1 where there is none
   float shift_x, shift_y;  // this picture's place in the noise field
 
   Colour ground_colour(float x, float y, float texel) const;
@@ -157,8 +157,15 @@ void paint_blade(cv::Mat& picture, cv::Point2d foot_px, double length_px, const 
 
 cv::Mat paint_backdrop(const Backdrop& backdrop, cv::Size size_px, const PictureCamera& camera,
                        const Ground& ground, float subject_distance, const NoiseField& noise, Rng& rng) {
-  Painter painter{backdrop, camera, ground, noise, rng, subject_distance, cv::Mat(size_px, CV_8UC3),
-                  cv::Mat1f(size_px), static_cast<float>(rng.uniform(0.0, 256.0)),
+  Painter painter{backdrop,
+                  camera,
+                  ground,
+                  noise,
+                  rng,
+                  subject_distance,
+                  cv::Mat(size_px, CV_8UC3),
+                  cv::Mat1f(size_px),
+                  static_cast<float>(rng.uniform(0.0, 256.0)),
                   static_cast<float>(rng.uniform(0.0, 256.0))};
   painter.paint_far_and_ground();
   for (int i = 0; i < backdrop.things; ++i) {

@@ -4,6 +4,7 @@
 #include "smal/body.h"
 #include "smal/rotation.h"
 #include "smal/synthetic_quadruped.h"
+#include "smal/synthetic_shapes.h"
 
 namespace q3d::pipeline::world {
 namespace {
@@ -21,7 +22,8 @@ RestMesh rest_of(const smal::SmalAsset& asset) {
     }
   }
   for (std::int64_t f = 0; f < faces.size(0); ++f) {
-    rest.triangles.push_back({static_cast<std::uint32_t>(faces[f][0]), static_cast<std::uint32_t>(faces[f][1]),
+    rest.triangles.push_back({static_cast<std::uint32_t>(faces[f][0]),
+                              static_cast<std::uint32_t>(faces[f][1]),
                               static_cast<std::uint32_t>(faces[f][2])});
   }
   for (std::size_t k = 0; k < asset.keypoint_vertices.size(); ++k) {
@@ -30,10 +32,15 @@ RestMesh rest_of(const smal::SmalAsset& asset) {
   return rest;
 }
 
-Eigen::MatrixXf matrix_of(const torch::Tensor& tensor) {  // rows of the last dimension
-  const auto flat = tensor.reshape({-1, tensor.size(-1)}).to(torch::kFloat32).contiguous();
+ShapeSpace shapes_of(const RestMesh& rest, const smal::SmalAsset& asset) {
   using RowMajor = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-  return Eigen::Map<const RowMajor>(flat.const_data_ptr<float>(), flat.size(0), flat.size(1));
+  const auto directions = asset.shapedirs.contiguous();
+  const smal::ShapeSpace& space = smal::synthetic_shape_space();
+  return {rest,
+          Eigen::Map<const RowMajor>(directions.const_data_ptr<float>(), 3 * directions.size(0), kBodyBetas)
+              .cast<double>(),
+          space.family_means,
+          {space.family_factors.begin(), space.family_factors.end()}};
 }
 
 }  // namespace
@@ -43,19 +50,22 @@ struct BodyModel::Model {
   RestMesh rest;
   ShapeSpace shapes;
   explicit Model(const smal::SmalAsset& asset)
-      : body(asset),
-        rest(rest_of(asset)),
-        shapes(rest, matrix_of(asset.shapedirs), matrix_of(smal::synthetic_family_means()),
-               matrix_of(smal::synthetic_betas_std()).transpose()) {}
+      : body(asset), rest(rest_of(asset)), shapes(shapes_of(rest, asset)) {}
 };
 
 BodyModel::BodyModel() : model_(std::make_unique<Model>(smal::make_synthetic_quadruped())) {}
 BodyModel::~BodyModel() = default;
 
-const RestMesh& BodyModel::rest() const { return model_->rest; }
-const ShapeSpace& BodyModel::shapes() const { return model_->shapes; }
+const RestMesh& BodyModel::rest() const {
+  return model_->rest;
+}
+const ShapeSpace& BodyModel::shapes() const {
+  return model_->shapes;
+}
 
-void BodyModel::save(const std::filesystem::path& asset) const { smal::save_asset(asset, model_->body.asset()); }
+void BodyModel::save(const std::filesystem::path& asset) const {
+  smal::save_asset(asset, model_->body.asset());
+}
 
 std::vector<Body> BodyModel::pose(std::span<const Posture> postures) const {
   const torch::InferenceMode no_gradient;

@@ -33,7 +33,7 @@ struct Body {
 struct RestMesh {
   std::vector<Eigen::Vector3f> vertices;
   std::vector<Triangle> triangles;
-  std::vector<std::array<float, kBodyJoints>> skinning;   // weights of each vertex, sum 1
+  std::vector<std::array<float, kBodyJoints>> skinning;  // weights of each vertex, sum 1
   std::array<std::vector<int>, kBodyKeypoints> keypoint_vertices;
 };
 

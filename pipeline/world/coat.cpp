@@ -26,7 +26,8 @@ template <std::size_t N>
 float share(const std::array<float, kBodyJoints>& skinning, const JointRange (&parts)[N]) {
   float sum = 0.0F;
   for (const JointRange& part : parts) {
-    for (int joint = part.first; joint <= part.last; ++joint) sum += skinning[static_cast<std::size_t>(joint)];
+    for (int joint = part.first; joint <= part.last; ++joint)
+      sum += skinning[static_cast<std::size_t>(joint)];
   }
   return sum;
 }
@@ -56,7 +57,9 @@ Eigen::Vector3f on_surface(const RestMesh& rest, const Eigen::Vector3f& point) {
   });
 }
 
-Colour linear(const Colour& screen) { return screen * screen; }  // gamma 2 is close enough, and cheap to undo
+Colour linear(const Colour& screen) {
+  return screen * screen;
+}  // gamma 2 is close enough, and cheap to undo
 
 }  // namespace
 
@@ -88,7 +91,8 @@ CoatPainter::CoatPainter(const RestMesh& rest, const NoiseField& noise) : noise_
     zone.belly = (1.0F - zone.tail) * smooth_step(0.3F, -0.8F, normals[v].y());
     const float neck = share(skin, kNeck) + 0.4F * zone.head * (1.0F - zone.muzzle);
     zone.crest = neck * smooth_step(0.5F, 0.9F, normals[v].y());
-    zone.ruff = std::min(1.0F, 1.3F * share(skin, kNeck) + 0.3F * zone.head * (1.0F - smooth_step(-0.6F, 0.0F, forward)));
+    zone.ruff = std::min(
+        1.0F, 1.3F * share(skin, kNeck) + 0.3F * zone.head * (1.0F - smooth_step(-0.6F, 0.0F, forward)));
   }
 }
 
@@ -98,9 +102,9 @@ BodyZone CoatPainter::zone(const Triangle& triangle, float u, float v) const {
   const auto mix = [&](float BodyZone::*field) { return w * a.*field + u * b.*field + v * c.*field; };
   BodyZone zone;
   zone.rest = w * a.rest + u * b.rest + v * c.rest;
-  for (const auto field : {&BodyZone::leg, &BodyZone::foot, &BodyZone::head, &BodyZone::muzzle, &BodyZone::ear,
-                           &BodyZone::tail, &BodyZone::tail_tip, &BodyZone::belly, &BodyZone::crest,
-                           &BodyZone::ruff}) {
+  for (const auto field :
+       {&BodyZone::leg, &BodyZone::foot, &BodyZone::head, &BodyZone::muzzle, &BodyZone::ear, &BodyZone::tail,
+        &BodyZone::tail_tip, &BodyZone::belly, &BodyZone::crest, &BodyZone::ruff}) {
     zone.*field = mix(field);
   }
   return zone;
@@ -128,7 +132,8 @@ float CoatPainter::marking(const Coat& coat, const BodyZone& zone, const Eigen::
   const Eigen::Vector3f p = zone.rest;
   const float scale = coat.mark_scale;
   switch (coat.marking) {
-    case Marking::plain: return 0.0F;
+    case Marking::plain:
+      return 0.0F;
     case Marking::spots: {
       const auto cell = noise_.cell(scale * p + individual);
       if (static_cast<float>(cell.label) > 255.0F * (0.35F + 0.65F * coat.mark_cover)) return 0.0F;
@@ -141,7 +146,8 @@ float CoatPainter::marking(const Coat& coat, const BodyZone& zone, const Eigen::
       const float gaps = noise_.at(2.5F * scale * p - individual);
       const float closed = zone.leg + zone.head + zone.tail;  // small full spots there
       const float full = 1.0F - smooth_step(0.25F, 0.38F, cell.nearest);
-      return std::max((1.0F - smooth_step(0.08F, 0.16F, ring)) * (gaps > -0.35F ? 1.0F : 0.2F), closed * full);
+      return std::max((1.0F - smooth_step(0.08F, 0.16F, ring)) * (gaps > -0.35F ? 1.0F : 0.2F),
+                      closed * full);
     }
     case Marking::stripes:
     case Marking::tabby: {

@@ -23,13 +23,13 @@ struct Coat {
   Colour mark{0.1F, 0.1F, 0.1F};    // spots, stripes, patches
   Colour crest{0.2F, 0.15F, 0.1F};  // mane and tail tip
   Marking marking = Marking::plain;
-  float mark_scale = 10.0F;  // marks for each SMAL unit
-  float mark_cover = 0.5F;   // 0 sparse, 1 dense
-  float belly_height = 0.3F; // how far the belly's colour climbs, 0 to 1
-  float leg_cover = 0.0F;    // 0 legs as the body, 1 legs wholly in their own colour
-  float mane = 0.0F;         // 0 none, 1 a full mane along neck and withers
-  float ruff = 0.0F;         // 1 a lion's ruff
-  float shag = 0.15F;        // unevenness of the fur
+  float mark_scale = 10.0F;   // marks for each SMAL unit
+  float mark_cover = 0.5F;    // 0 sparse, 1 dense
+  float belly_height = 0.3F;  // how far the belly's colour climbs, 0 to 1
+  float leg_cover = 0.0F;     // 0 legs as the body, 1 legs wholly in their own colour
+  float mane = 0.0F;          // 0 none, 1 a full mane along neck and withers
+  float ruff = 0.0F;          // 1 a lion's ruff
+  float shag = 0.15F;         // unevenness of the fur
   float gloss = 0.1F;
 };
 
@@ -37,9 +37,9 @@ struct Coat {
 struct BodyZone {
   Eigen::Vector3f rest;  // position on the resting template
   float leg = 0.0F, foot = 0.0F, head = 0.0F, muzzle = 0.0F, ear = 0.0F, tail = 0.0F, tail_tip = 0.0F;
-  float belly = 0.0F;    // 1 underneath, 0 on the back
-  float crest = 0.0F;    // 1 along the upper line of the neck
-  float ruff = 0.0F;     // 1 around the neck and behind the face
+  float belly = 0.0F;  // 1 underneath, 0 on the back
+  float crest = 0.0F;  // 1 along the upper line of the neck
+  float ruff = 0.0F;   // 1 around the neck and behind the face
 };
 
 class CoatPainter {

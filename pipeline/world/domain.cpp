@@ -13,13 +13,18 @@ Domain animal3d() {
   d.frequency = &Frequency::animal3d;
   d.stance = {.extreme = 0.03, .resting = 0.12, .spread = 1.0};
   d.side_view = 0.65;
-  d.framing = {.fill_low = 0.55, .fill_high = 0.95, .truncated = 0.08, .box_bias = 1.01, .box_spread = 0.015};
+  d.framing = {.fill_low = 0.62, .fill_high = 0.97, .truncated = 0.08, .box_bias = 1.01, .box_spread = 0.015};
   d.sizes = {{1.0, 0.75}, {1.0, 0.75}, {1.0, 0.667}, {0.75, 1.0}, {1.0, 1.0}};
   d.places = {30, 18, 12, 6, 6, 8, 14, 6, 0};
   d.sunny = 0.6;
   d.occluded = 0.15;
-  d.lens = {.blur_low = 0.4, .blur_high = 0.9, .motion = 0.03, .noise_low = 1.0, .noise_high = 5.0,
-            .quality_low = 70, .quality_high = 95};
+  d.lens = {.blur_low = 0.4,
+            .blur_high = 0.9,
+            .motion = 0.03,
+            .noise_low = 1.0,
+            .noise_high = 5.0,
+            .quality_low = 70,
+            .quality_high = 95};
   d.labels = {.visible = 0.97, .self_hidden = 0.7, .occluded = 0.4, .swapped = 0.02, .jitter = 0.006};
   return d;
 }
@@ -41,8 +46,16 @@ Domain ctrlani3d() {
   d.places = {18, 10, 10, 8, 10, 6, 4, 8, 26};
   d.sunny = 0.75;
   d.occluded = 0.0;
-  d.lens = {.blur_low = 0.3, .blur_high = 0.5, .motion = 0.0, .noise_low = 0.0, .noise_high = 0.8,
-            .saturation = 1.45, .contrast = 1.12, .warmth_spread = 0.02, .quality_low = 92, .quality_high = 97};
+  d.lens = {.blur_low = 0.3,
+            .blur_high = 0.5,
+            .motion = 0.0,
+            .noise_low = 0.0,
+            .noise_high = 0.8,
+            .saturation = 1.45,
+            .contrast = 1.12,
+            .warmth_spread = 0.02,
+            .quality_low = 92,
+            .quality_high = 97};
   d.labels = {.visible = 1.0, .self_hidden = 1.0, .occluded = 1.0, .swapped = 0.0, .jitter = 0.0};
   return d;
 }
@@ -59,19 +72,26 @@ Domain superanimal() {
   d.side_view = 0.45;
   d.camera_high_deg = 9.0;
   d.camera_high_spread_deg = 10.0;
-  d.framing = {.fill_low = 0.4, .fill_high = 0.98, .truncated = 0.14, .box_bias = 1.02, .box_spread = 0.03};
+  d.framing = {.fill_low = 0.45, .fill_high = 0.98, .truncated = 0.12, .box_bias = 1.02, .box_spread = 0.03};
   d.sizes = {{1.0, 0.75}, {1.0, 0.667}, {0.667, 1.0}, {1.0, 1.0}, {1.0, 0.5625}};
   d.places = {24, 14, 12, 8, 6, 10, 14, 12, 0};
   d.sunny = 0.5;
   d.occluded = 0.28;
-  d.lens = {.blur_low = 0.4, .blur_high = 1.3, .motion = 0.06, .noise_low = 1.0, .noise_high = 8.0,
-            .saturation = 0.95, .warmth_spread = 0.06, .quality_low = 55, .quality_high = 95};
+  d.lens = {.blur_low = 0.4,
+            .blur_high = 1.3,
+            .motion = 0.06,
+            .noise_low = 1.0,
+            .noise_high = 8.0,
+            .saturation = 0.95,
+            .warmth_spread = 0.06,
+            .quality_low = 55,
+            .quality_high = 95};
   d.labels = {.visible = 0.95, .self_hidden = 0.6, .occluded = 0.35, .swapped = 0.03, .jitter = 0.008};
   return d;
 }
 
-// Frames of films and camera traps: small or cropped animals, grey nights, stamps, movement; boxes that follow
-// the labelled points.
+// Frames of films and camera traps: small or cropped animals, grey nights, stamps, movement; boxes that
+// follow the labelled points.
 Domain animal_kingdom() {
   Domain d;
   d.id = SetId::animal_kingdom;
@@ -88,9 +108,18 @@ Domain animal_kingdom() {
   d.places = {18, 26, 20, 8, 8, 12, 6, 0, 0};
   d.sunny = 0.45;
   d.occluded = 0.45;
-  d.lens = {.blur_low = 0.7, .blur_high = 2.0, .motion = 0.18, .noise_low = 2.0, .noise_high = 9.0,
-            .saturation = 0.85, .contrast = 0.95, .warmth_spread = 0.08, .grey = 0.22, .stamped = 0.25,
-            .quality_low = 50, .quality_high = 85};
+  d.lens = {.blur_low = 0.7,
+            .blur_high = 2.0,
+            .motion = 0.18,
+            .noise_low = 2.0,
+            .noise_high = 9.0,
+            .saturation = 0.85,
+            .contrast = 0.95,
+            .warmth_spread = 0.08,
+            .grey = 0.22,
+            .stamped = 0.25,
+            .quality_low = 50,
+            .quality_high = 85};
   d.labels = {.visible = 0.93, .self_hidden = 0.4, .occluded = 0.25, .swapped = 0.03, .jitter = 0.008};
   return d;
 }

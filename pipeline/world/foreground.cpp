@@ -24,7 +24,8 @@ struct Layer {
     cv::line(cover, from, to, cv::Scalar(255), thickness, cv::LINE_AA);
   }
   void ellipse(cv::Point centre, cv::Size axes, double degrees, const Colour& paint) {
-    cv::ellipse(colour, centre, axes + cv::Size(1, 1), degrees, 0, 360, to_bgr(paint), cv::FILLED, cv::LINE_8);
+    cv::ellipse(colour, centre, axes + cv::Size(1, 1), degrees, 0, 360, to_bgr(paint), cv::FILLED,
+                cv::LINE_8);
     cv::ellipse(cover, centre, axes, degrees, 0, 360, cv::Scalar(255), cv::FILLED, cv::LINE_AA);
   }
   void soften(double sigma) {
@@ -79,33 +80,52 @@ void upright(Layer& layer, const cv::Rect& animal, Rng& rng) {
   for (int strip = 0; strip < kStrips; ++strip) {
     const int left = static_cast<int>(x + width * strip / kStrips);
     const int right = static_cast<int>(x + width * (strip + 1) / kStrips) + 1;
-    layer.polygon({{left, layer.cover.rows + 2}, {right, layer.cover.rows + 2},
-                   {right + static_cast<int>(lean), -2}, {left + static_cast<int>(lean), -2}},
+    layer.polygon({{left, layer.cover.rows + 2},
+                   {right, layer.cover.rows + 2},
+                   {right + static_cast<int>(lean), -2},
+                   {left + static_cast<int>(lean), -2}},
                   colour * (0.7F + 0.15F * static_cast<float>(strip)));
   }
 }
 
+// A tuft: dense and high in its middle, thin at its edges.
 void tall_grass(Layer& layer, const cv::Rect& animal, const Backdrop& backdrop, Rng& rng) {
   const int blades = 60 + rng.below(120);
   const double height = animal.height * rng.uniform(0.2, 0.5);
-  const double left = animal.x + animal.width * rng.uniform(-0.1, 0.6), span = animal.width * rng.uniform(0.3, 0.7);
+  const double middle = animal.x + animal.width * rng.uniform(0.0, 1.0),
+               spread = animal.width * rng.uniform(0.1, 0.25);
   const int base = animal.y + animal.height + animal.height / 12;
   for (int i = 0; i < blades; ++i) {
-    const cv::Point foot(static_cast<int>(left + span * rng.uniform()), base + rng.below(6));
-    const double length = height * rng.uniform(0.5, 1.2);
-    const cv::Point tip = foot + cv::Point(static_cast<int>(length * rng.normal(0.0, 0.25)),
-                                           static_cast<int>(-length));
+    const double away = std::clamp(rng.normal(), -2.2, 2.2);
+    const cv::Point foot(static_cast<int>(middle + spread * away),
+                         base + static_cast<int>(0.06 * animal.height * rng.normal()));
+    const double length = height * rng.uniform(0.4, 1.2) * (1.1 - 0.3 * std::abs(away));
+    const double lean = 0.12 * away + rng.normal(0.0, 0.18);
+    const cv::Point tip = foot + cv::Point(static_cast<int>(length * lean), static_cast<int>(-length));
     layer.line(foot, tip, shade_of(backdrop, rng), 1 + rng.below(2));
   }
 }
 
+// Half a boulder before the animal: an uneven outline, its top lit.
 void stone(Layer& layer, const cv::Rect& animal, Rng& rng) {
   const Colour colour = blend(rgb(84, 80, 74), rgb(168, 162, 152), static_cast<float>(rng.uniform()));
-  const cv::Size axes(static_cast<int>(animal.width * rng.uniform(0.12, 0.3)),
-                      static_cast<int>(animal.height * rng.uniform(0.12, 0.3)));
-  const cv::Point centre(animal.x + rng.below(std::max(1, animal.width)), animal.y + animal.height);
-  layer.ellipse(centre, axes, rng.uniform(-15.0, 15.0), colour * 0.75F);
-  layer.ellipse(centre - cv::Point(0, axes.height / 4), cv::Size(axes.width * 4 / 5, axes.height * 4 / 5), rng.uniform(-15.0, 15.0), colour);
+  const double width = animal.width * rng.uniform(0.12, 0.3),
+               height = animal.height * rng.uniform(0.15, 0.35);
+  const cv::Point2d foot(animal.x + animal.width * rng.uniform(), animal.y + 1.04 * animal.height);
+  std::vector<cv::Point2d> outline;
+  constexpr int kCorners = 13;
+  for (int corner = 0; corner < kCorners; ++corner) {
+    const double angle = CV_PI * corner / (kCorners - 1), bump = rng.uniform(0.86, 1.08);
+    outline.emplace_back(width * bump * std::cos(angle), -height * bump * std::pow(std::sin(angle), 0.7));
+  }
+  for (const double part : {1.0, 0.85, 0.65}) {  // nested outlines, the inner ones lighter and higher
+    std::vector<cv::Point> corners;
+    for (const cv::Point2d& p : outline) {
+      corners.emplace_back(static_cast<int>(foot.x + part * p.x),
+                           static_cast<int>(foot.y + part * p.y - 0.9 * (1.0 - part) * height));
+    }
+    layer.polygon(corners, colour * static_cast<float>(1.35 - 0.65 * part));
+  }
 }
 
 void bars(Layer& layer, const cv::Rect& animal, Rng& rng) {
@@ -115,8 +135,10 @@ void bars(Layer& layer, const cv::Rect& animal, Rng& rng) {
   const bool level = rng.chance(0.3);
   for (double at = gap * rng.uniform(); at < std::max(layer.cover.cols, layer.cover.rows); at += gap) {
     const int where = static_cast<int>(at);
-    if (level) layer.line({0, where}, {layer.cover.cols, where}, colour, thick);
-    else layer.line({where, 0}, {where, layer.cover.rows}, colour, thick);
+    if (level)
+      layer.line({0, where}, {layer.cover.cols, where}, colour, thick);
+    else
+      layer.line({where, 0}, {where, layer.cover.rows}, colour, thick);
   }
 }
 
@@ -137,12 +159,24 @@ void paint_occluder(cv::Mat& picture, cv::Mat1b& cover, const cv::Rect& animal_p
   Layer layer(picture.size());
   const bool indoors = backdrop.place == Place::room || backdrop.place == Place::studio;
   switch (indoors ? 1 + 3 * rng.below(2) : rng.below(6)) {
-    case 0: leafy_branch(layer, animal_px, backdrop, rng); break;
-    case 1: upright(layer, animal_px, rng); break;
-    case 2: tall_grass(layer, animal_px, backdrop, rng); break;
-    case 3: stone(layer, animal_px, rng); break;
-    case 4: bars(layer, animal_px, rng); break;
-    default: near_blur(layer, animal_px, backdrop, rng); break;
+    case 0:
+      leafy_branch(layer, animal_px, backdrop, rng);
+      break;
+    case 1:
+      upright(layer, animal_px, rng);
+      break;
+    case 2:
+      tall_grass(layer, animal_px, backdrop, rng);
+      break;
+    case 3:
+      stone(layer, animal_px, rng);
+      break;
+    case 4:
+      bars(layer, animal_px, rng);
+      break;
+    default:
+      near_blur(layer, animal_px, backdrop, rng);
+      break;
   }
   for (int row = 0; row < picture.rows; ++row) {
     auto* out = picture.ptr<cv::Vec3b>(row);
@@ -151,8 +185,8 @@ void paint_occluder(cv::Mat& picture, cv::Mat1b& cover, const cv::Rect& animal_p
       const int alpha = layer.cover(row, column);
       if (alpha == 0) continue;
       for (int channel = 0; channel < 3; ++channel) {
-        out[column][channel] =
-            static_cast<std::uint8_t>((out[column][channel] * (255 - alpha) + over[column][channel] * alpha) / 255);
+        out[column][channel] = static_cast<std::uint8_t>(
+            (out[column][channel] * (255 - alpha) + over[column][channel] * alpha) / 255);
       }
       cover(row, column) = std::max(cover(row, column), static_cast<std::uint8_t>(alpha >= 128 ? 255 : 0));
     }

@@ -15,7 +15,8 @@ namespace q3d::pipeline::world {
 void paint_occluder(cv::Mat& picture, cv::Mat1b& cover, const cv::Rect& animal_px, const Backdrop& backdrop,
                     Rng& rng);
 
-// Grass in front of the feet: blades that start at the vertices nearest the ground. Too thin to hide anything.
+// Grass in front of the feet: blades that start at the vertices nearest the ground. Too thin to hide
+// anything.
 void paint_grass_at_feet(cv::Mat& picture, const Backdrop& backdrop, const PictureCamera& camera,
                          const Ground& ground, std::span<const Eigen::Vector3f> vertices, Rng& rng);
 

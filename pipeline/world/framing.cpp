@@ -38,7 +38,8 @@ struct BoxError {
 };
 
 cv::Rect drawn_box(const Extent& seen, const BoxError& error, cv::Size picture_px) {
-  const double width = (seen.right - seen.left) * error.width, height = (seen.bottom - seen.top) * error.height;
+  const double width = (seen.right - seen.left) * error.width,
+               height = (seen.bottom - seen.top) * error.height;
   const double x = 0.5 * (seen.left + seen.right) + error.shift_x * width;
   const double y = 0.5 * (seen.top + seen.bottom) + error.shift_y * height;
   const cv::Point corner(static_cast<int>(std::lround(x - 0.5 * width)),
@@ -75,14 +76,23 @@ Placement draw_placement(double aspect, cv::Size picture_px, const FramingHabits
   };
   Placement placement{side, {centre(width, picture_px.width), centre(height, picture_px.height)}};
   if (rng.chance(habits.truncated)) {
-    placement.side_px *= rng.uniform(1.0, 1.5);
-    // Push it over one border, by up to two fifths of its own size.
-    const double over = rng.uniform(0.1, 0.4) * placement.side_px;
-    const double half_w = 0.5 * width * placement.side_px / side, half_h = 0.5 * height * placement.side_px / side;
+    placement.side_px *= rng.uniform(1.0, 1.4);
+    // Push it over one border, by up to a third of its own size.
+    const double over = rng.uniform(0.08, 0.33) * placement.side_px;
+    const double half_w = 0.5 * width * placement.side_px / side,
+                 half_h = 0.5 * height * placement.side_px / side;
     switch (rng.below(5)) {
-      case 0: case 1: placement.centre_px.x = half_w - over; break;
-      case 2: case 3: placement.centre_px.x = picture_px.width - half_w + over; break;
-      default: placement.centre_px.y = picture_px.height - half_h + 0.7 * std::min(over, half_h); break;
+      case 0:
+      case 1:
+        placement.centre_px.x = half_w - over;
+        break;
+      case 2:
+      case 3:
+        placement.centre_px.x = picture_px.width - half_w + over;
+        break;
+      default:
+        placement.centre_px.y = picture_px.height - half_h + 0.7 * std::min(over, half_h);
+        break;
     }
   }
   return placement;
@@ -123,11 +133,11 @@ Framing frame_animal(std::span<const Eigen::Vector3f> vertices, cv::Size picture
   const double aspect = (flat.right - flat.left) / (flat.bottom - flat.top);
   const Placement placement = draw_placement(aspect, picture_px, habits, rng);
   const BoxError error{rng.normal(habits.box_bias, habits.box_spread),
-                       rng.normal(habits.box_bias, habits.box_spread), rng.normal(0.0, 0.5 * habits.box_spread),
-                       rng.normal(0.0, 0.5 * habits.box_spread)};
+                       rng.normal(habits.box_bias, habits.box_spread),
+                       rng.normal(0.0, 0.5 * habits.box_spread), rng.normal(0.0, 0.5 * habits.box_spread)};
 
-  // The camera depends on the box, the silhouette on the camera, and the box on the silhouette; the dependence
-  // is weak, because the animal is four or more of its own lengths away.
+  // The camera depends on the box, the silhouette on the camera, and the box on the silhouette; the
+  // dependence is weak, because the animal is four or more of its own lengths away.
   Framing framing;
   const double half = 0.5 * placement.side_px;
   Extent seen{placement.centre_px.x - half, placement.centre_px.y - half / aspect,

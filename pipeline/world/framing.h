@@ -1,8 +1,8 @@
 // Where the animal stands in the picture, the annotator's box around it, and the camera that follows.
 //
-// The network's crop camera has focal 1000 px for a crop scaled to 256 px and its principal point in the crop's
-// centre. A picture is therefore rendered with that very camera, carried to its own pixels: focal
-// 1000 * side / 256 px, principal point in the (floored) centre of the annotated box. It is a part of a larger
+// The network's crop camera has focal 1000 px for a crop scaled to 256 px and its principal point in the
+// crop's centre. A picture is therefore rendered with that very camera, carried to its own pixels: focal 1000
+// * side / 256 px, principal point in the (floored) centre of the annotated box. It is a part of a larger
 // sensor's picture, so to say. The translation that goes with it is then exact.
 #pragma once
 

@@ -35,13 +35,12 @@ void paint_trunk(cv::Mat& picture, const Spot& spot, const Backdrop& backdrop, R
     const double left = spot.foot_px.x + width * (static_cast<double>(strip) / kStrips - 0.5);
     const double step = width / kStrips + 1.0;
     const float light = 0.6F + 0.5F * static_cast<float>(lit_left ? kStrips - strip : strip + 1) / kStrips;
-    const std::vector<cv::Point> quad{
-        {static_cast<int>(left), static_cast<int>(spot.foot_px.y)},
-        {static_cast<int>(left + step), static_cast<int>(spot.foot_px.y)},
-        {static_cast<int>(left + step + lean), static_cast<int>(top)},
-        {static_cast<int>(left + lean), static_cast<int>(top)}};
-    const Colour colour = blend(bark, backdrop.far_dark, 0.25F) * light *
-                          static_cast<float>(rng.uniform(0.9, 1.1));
+    const std::vector<cv::Point> quad{{static_cast<int>(left), static_cast<int>(spot.foot_px.y)},
+                                      {static_cast<int>(left + step), static_cast<int>(spot.foot_px.y)},
+                                      {static_cast<int>(left + step + lean), static_cast<int>(top)},
+                                      {static_cast<int>(left + lean), static_cast<int>(top)}};
+    const Colour colour =
+        blend(bark, backdrop.far_dark, 0.25F) * light * static_cast<float>(rng.uniform(0.9, 1.1));
     cv::fillConvexPoly(picture, quad, to_bgr(colour), cv::LINE_AA);
   }
 }
@@ -56,8 +55,8 @@ void paint_bush(cv::Mat& picture, const Spot& spot, const Backdrop& backdrop, Rn
         std::clamp(0.25 + 0.25 * leaf / 70.0 - 0.4 * std::sin(angle) * reach / radius + rng.normal(0.0, 0.12),
                    0.0, 1.0));
     const Colour colour = blend(backdrop.blade_dark * 0.6F, backdrop.blade_light, light);
-    cv::circle(picture, centre, std::max(1, static_cast<int>(radius * rng.uniform(0.06, 0.2))), to_bgr(colour),
-               cv::FILLED, cv::LINE_AA);
+    cv::circle(picture, centre, std::max(1, static_cast<int>(radius * rng.uniform(0.06, 0.2))),
+               to_bgr(colour), cv::FILLED, cv::LINE_AA);
   }
 }
 
@@ -99,33 +98,38 @@ void paint_cupboard(cv::Mat& picture, const Spot& spot, const Backdrop& backdrop
   const Colour cloth(static_cast<float>(rng.uniform(0.1, 0.9)), static_cast<float>(rng.uniform(0.1, 0.8)),
                      static_cast<float>(rng.uniform(0.1, 0.8)));
   const Colour front = rng.chance(0.5) ? blend(backdrop.far_dark, backdrop.far_light, 0.5F) : cloth;
-  const cv::Rect body(static_cast<int>(spot.foot_px.x - 0.5 * width), static_cast<int>(spot.foot_px.y - height),
-                      static_cast<int>(width), static_cast<int>(height));
+  const cv::Rect body(static_cast<int>(spot.foot_px.x - 0.5 * width),
+                      static_cast<int>(spot.foot_px.y - height), static_cast<int>(width),
+                      static_cast<int>(height));
   cv::rectangle(picture, body, to_bgr(front), cv::FILLED);
   cv::rectangle(picture, body, to_bgr(front * 0.6F), 2, cv::LINE_AA);
 }
 
 }  // namespace
 
-void paint_thing(cv::Mat& picture, const Backdrop& backdrop, const PictureCamera& camera, const Ground& ground,
-                 float subject_distance, Rng& rng) {
+void paint_thing(cv::Mat& picture, const Backdrop& backdrop, const PictureCamera& camera,
+                 const Ground& ground, float subject_distance, Rng& rng) {
   const Spot spot = spot_behind(picture, camera, ground, subject_distance, rng);
   switch (backdrop.place) {
-    case Place::forest: return rng.chance(0.65) ? paint_trunk(picture, spot, backdrop, rng)
-                                                : paint_bush(picture, spot, backdrop, rng);
+    case Place::forest:
+      return rng.chance(0.65) ? paint_trunk(picture, spot, backdrop, rng)
+                              : paint_bush(picture, spot, backdrop, rng);
     case Place::meadow:
-    case Place::savanna: return rng.chance(0.2) ? paint_trunk(picture, spot, backdrop, rng)
-                                : rng.chance(0.7) ? paint_bush(picture, spot, backdrop, rng)
-                                                  : paint_stone(picture, spot, rng);
-    case Place::snow: return rng.chance(0.5) ? paint_trunk(picture, spot, backdrop, rng)
-                                             : paint_stone(picture, spot, rng);
+    case Place::savanna:
+      return rng.chance(0.2)   ? paint_trunk(picture, spot, backdrop, rng)
+             : rng.chance(0.7) ? paint_bush(picture, spot, backdrop, rng)
+                               : paint_stone(picture, spot, rng);
+    case Place::snow:
+      return rng.chance(0.5) ? paint_trunk(picture, spot, backdrop, rng) : paint_stone(picture, spot, rng);
     case Place::desert:
-    case Place::rocks: return rng.chance(0.25) ? paint_bush(picture, spot, backdrop, rng)
-                                               : paint_stone(picture, spot, rng);
-    case Place::yard: return rng.chance(0.7) ? paint_fence(picture, spot, rng)
-                                             : paint_bush(picture, spot, backdrop, rng);
-    case Place::room: return paint_cupboard(picture, spot, backdrop, rng);
-    case Place::studio: return;
+    case Place::rocks:
+      return rng.chance(0.25) ? paint_bush(picture, spot, backdrop, rng) : paint_stone(picture, spot, rng);
+    case Place::yard:
+      return rng.chance(0.7) ? paint_fence(picture, spot, rng) : paint_bush(picture, spot, backdrop, rng);
+    case Place::room:
+      return paint_cupboard(picture, spot, backdrop, rng);
+    case Place::studio:
+      return;
   }
 }
 

@@ -12,13 +12,32 @@ namespace q3d::pipeline::world {
 namespace {
 
 // SMAL's 26, by the names that the tables below use.
-constexpr std::array<std::string_view, kBodyKeypoints> kBodyNames{
-    "left_eye",         "right_eye",         "chin",             "left_front_paw",    "right_front_paw",
-    "left_back_paw",    "right_back_paw",    "tail_base",        "left_front_thigh",  "right_front_thigh",
-    "left_back_thigh",  "right_back_thigh",  "left_shoulder",    "right_shoulder",    "left_front_knee",
-    "right_front_knee", "left_back_knee",    "right_back_knee",  "neck",              "tail_tip",
-    "left_ear",         "right_ear",         "left_mouth_corner", "right_mouth_corner", "nose",
-    "tail_mid"};
+constexpr std::array<std::string_view, kBodyKeypoints> kBodyNames{"left_eye",
+                                                                  "right_eye",
+                                                                  "chin",
+                                                                  "left_front_paw",
+                                                                  "right_front_paw",
+                                                                  "left_back_paw",
+                                                                  "right_back_paw",
+                                                                  "tail_base",
+                                                                  "left_front_thigh",
+                                                                  "right_front_thigh",
+                                                                  "left_back_thigh",
+                                                                  "right_back_thigh",
+                                                                  "left_shoulder",
+                                                                  "right_shoulder",
+                                                                  "left_front_knee",
+                                                                  "right_front_knee",
+                                                                  "left_back_knee",
+                                                                  "right_back_knee",
+                                                                  "neck",
+                                                                  "tail_tip",
+                                                                  "left_ear",
+                                                                  "right_ear",
+                                                                  "left_mouth_corner",
+                                                                  "right_mouth_corner",
+                                                                  "nose",
+                                                                  "tail_mid"};
 
 struct NamedPlace {
   std::string_view name;   // the dataset's
@@ -67,8 +86,8 @@ constexpr std::array<NamedPlace, 39> kSuperAnimal{{
     {"body_middle_left", "left_flank"},
 }};
 
-// Animal Kingdom counts the limbs from the body outwards: its wrist and ankle are the feet, its elbow and knee
-// the middle joints, its hip lies on the line of the back.
+// Animal Kingdom counts the limbs from the body outwards: its wrist and ankle are the feet, its elbow and
+// knee the middle joints, its hip lies on the line of the back.
 constexpr std::array<NamedPlace, 23> kAnimalKingdom{{
     {"Head_Mid_Top", "head_top"},
     {"Eye_Left", "left_eye"},
@@ -105,12 +124,14 @@ class SurfacePlaces {
  public:
   explicit SurfacePlaces(const RestMesh& rest) : rest_(rest) {
     for (std::size_t k = 0; k < keypoints_.size(); ++k) {
+      keypoints_[k].setZero();
       for (const int vertex : rest.keypoint_vertices[k]) {
         keypoints_[k] += rest.vertices[static_cast<std::size_t>(vertex)];
       }
       keypoints_[k] /= static_cast<float>(rest.keypoint_vertices[k].size());
     }
-    const float tail = at("tail_base").x(), withers = 0.5F * (at("left_shoulder").x() + at("right_shoulder").x());
+    const float tail = at("tail_base").x(),
+                withers = 0.5F * (at("left_shoulder").x() + at("right_shoulder").x());
     const float head = at("neck").x();
     const Eigen::Vector3f up = Eigen::Vector3f::UnitY(), right = Eigen::Vector3f::UnitZ();
     vertex_["back_base"] = extreme(withers, kTorso, up);
@@ -140,7 +161,8 @@ class SurfacePlaces {
     float reach = 0.0F;
     for (const int vertex : rest_.keypoint_vertices[static_cast<std::size_t>(keypoint)]) {
       reach = std::max(reach, (rest_.vertices[static_cast<std::size_t>(vertex)] -
-                               keypoints_[static_cast<std::size_t>(keypoint)]).norm());
+                               keypoints_[static_cast<std::size_t>(keypoint)])
+                                  .norm());
     }
     return reach;
   }
@@ -162,7 +184,8 @@ class SurfacePlaces {
   bool belongs(std::size_t vertex, const std::array<Joints, N>& parts) const {
     float sum = 0.0F;
     for (const Joints& part : parts) {
-      for (int j = part.first; j <= part.last; ++j) sum += rest_.skinning[vertex][static_cast<std::size_t>(j)];
+      for (int j = part.first; j <= part.last; ++j)
+        sum += rest_.skinning[vertex][static_cast<std::size_t>(j)];
     }
     return sum > 0.5F;
   }
@@ -191,9 +214,10 @@ class SurfacePlaces {
   int nearest(const Eigen::Vector3f& side, int level) const {
     const Eigen::Vector3f& line = rest_.vertices[static_cast<std::size_t>(level)];
     const Eigen::Vector3f target(line.x(), line.y() - 0.05F, 0.6F * side.z());
-    const auto found = std::min_element(
-        rest_.vertices.begin(), rest_.vertices.end(),
-        [&](const auto& a, const auto& b) { return (a - target).squaredNorm() < (b - target).squaredNorm(); });
+    const auto found =
+        std::min_element(rest_.vertices.begin(), rest_.vertices.end(), [&](const auto& a, const auto& b) {
+          return (a - target).squaredNorm() < (b - target).squaredNorm();
+        });
     return static_cast<int>(found - rest_.vertices.begin());
   }
 
@@ -214,14 +238,16 @@ class SurfacePlaces {
   }
 
   const RestMesh& rest_;
-  std::array<Eigen::Vector3f, kBodyKeypoints> keypoints_{};
+  std::array<Eigen::Vector3f, kBodyKeypoints> keypoints_;
   std::map<std::string, int> vertex_;
 };
 
 // left <-> right in a name, whatever its case.
 std::string mirrored(std::string name) {
   for (const auto& [from, to] : {std::pair<std::string_view, std::string_view>{"left", "right"},
-                                 {"right", "left"}, {"Left", "Right"}, {"Right", "Left"}}) {
+                                 {"right", "left"},
+                                 {"Left", "Right"},
+                                 {"Right", "Left"}}) {
     const auto at = name.find(from);
     if (at != std::string::npos) return name.replace(at, from.size(), to);
   }
@@ -252,7 +278,8 @@ std::vector<Landmark> make_set(std::span<const NamedPlace> table, const RestMesh
   }
   for (Landmark& landmark : set) {
     const std::string partner = mirrored(landmark.name);
-    const auto found = std::find_if(set.begin(), set.end(), [&](const Landmark& l) { return l.name == partner; });
+    const auto found =
+        std::find_if(set.begin(), set.end(), [&](const Landmark& l) { return l.name == partner; });
     landmark.mirror = static_cast<int>(found - set.begin());
   }
   return set;
@@ -266,9 +293,13 @@ std::vector<Landmark> animal3d_landmarks(const RestMesh& rest) {
   return make_set(table, rest);
 }
 
-std::vector<Landmark> superanimal_landmarks(const RestMesh& rest) { return make_set(kSuperAnimal, rest); }
+std::vector<Landmark> superanimal_landmarks(const RestMesh& rest) {
+  return make_set(kSuperAnimal, rest);
+}
 
-std::vector<Landmark> animal_kingdom_landmarks(const RestMesh& rest) { return make_set(kAnimalKingdom, rest); }
+std::vector<Landmark> animal_kingdom_landmarks(const RestMesh& rest) {
+  return make_set(kAnimalKingdom, rest);
+}
 
 std::vector<Eigen::Vector3f> landmark_points(const std::vector<Landmark>& landmarks, const Body& body) {
   std::vector<Eigen::Vector3f> points;

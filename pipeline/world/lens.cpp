@@ -17,7 +17,8 @@ void smear(cv::Mat& picture, Rng& rng) {
   cv::Mat1f kernel(length, length, 0.0F);
   for (int i = 0; i < length; ++i) {
     const double along = i - length / 2;
-    const int row = std::clamp(static_cast<int>(std::lround(length / 2 + along * std::sin(angle))), 0, length - 1);
+    const int row =
+        std::clamp(static_cast<int>(std::lround(length / 2 + along * std::sin(angle))), 0, length - 1);
     const int column =
         std::clamp(static_cast<int>(std::lround(length / 2 + along * std::cos(angle))), 0, length - 1);
     kernel(row, column) += 1.0F / static_cast<float>(length);
@@ -29,7 +30,8 @@ void smear(cv::Mat& picture, Rng& rng) {
 void grade(cv::Mat& picture, const LensHabits& habits, Rng& rng) {
   const double contrast = habits.contrast * std::exp(rng.normal(0.0, 0.08));
   const double brightness = rng.normal(0.0, 8.0);
-  const double warm = rng.normal(0.0, habits.warmth_spread), green = rng.normal(0.0, 0.3 * habits.warmth_spread);
+  const double warm = rng.normal(0.0, habits.warmth_spread),
+               green = rng.normal(0.0, 0.3 * habits.warmth_spread);
   const double gains[3] = {1.0 - warm, 1.0 + green, 1.0 + warm};
   cv::Mat curve(1, 256, CV_8UC3);
   for (int level = 0; level < 256; ++level) {

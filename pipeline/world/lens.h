@@ -15,9 +15,9 @@ struct LensHabits {
   double noise_low = 1.0, noise_high = 6.0;  // grey levels
   double saturation = 1.0, contrast = 1.0;   // means; every picture differs a little
   double warmth_spread = 0.04;
-  double grey = 0.0;     // share of pictures without colour (infrared)
-  double stamped = 0.0;  // share with a camera's bar of time and temperature
-  int quality_low = 75, quality_high = 95;   // JPEG
+  double grey = 0.0;                        // share of pictures without colour (infrared)
+  double stamped = 0.0;                     // share with a camera's bar of time and temperature
+  int quality_low = 75, quality_high = 95;  // JPEG
 };
 
 // Changes the picture (BGR, 8 bit) in place.

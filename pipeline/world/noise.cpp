@@ -10,8 +10,12 @@
 namespace q3d::pipeline::world {
 namespace {
 
-float fade(float t) { return t * t * (3.0F - 2.0F * t); }
-float mix(float a, float b, float t) { return a + (b - a) * t; }
+float fade(float t) {
+  return t * t * (3.0F - 2.0F * t);
+}
+float mix(float a, float b, float t) {
+  return a + (b - a) * t;
+}
 
 }  // namespace
 

@@ -13,16 +13,16 @@ class NoiseField {
  public:
   explicit NoiseField(std::uint64_t seed);
 
-  float at(float x, float y) const;           // [-1, 1]
-  float at(const Eigen::Vector3f& p) const;   // [-1, 1]
+  float at(float x, float y) const;          // [-1, 1]
+  float at(const Eigen::Vector3f& p) const;  // [-1, 1]
   // Sum of octaves, each of twice the frequency and half the height of the one before; about [-1, 1].
   float octaves(float x, float y, int count) const;
   float octaves(const Eigen::Vector3f& p, int count) const;
 
   struct Cell {
-    float nearest = 0.0F;      // distance to the nearest feature point, in lattice steps
-    float second = 0.0F;       // and to the one after it
-    std::uint32_t label = 0;   // random number of the nearest point
+    float nearest = 0.0F;     // distance to the nearest feature point, in lattice steps
+    float second = 0.0F;      // and to the one after it
+    std::uint32_t label = 0;  // random number of the nearest point
   };
   // Cellular noise: one jittered feature point for each lattice cube.
   Cell cell(const Eigen::Vector3f& p) const;

@@ -17,7 +17,17 @@
 namespace q3d::pipeline::world {
 namespace {
 
-enum Purpose : std::uint64_t { individual = 11, moment, size, framing, light, surroundings, occluders, lens, labels };
+enum Purpose : std::uint64_t {
+  individual = 11,
+  moment,
+  size,
+  framing,
+  light,
+  surroundings,
+  occluders,
+  lens,
+  labels
+};
 
 constexpr double kLeastVisible = 0.45;  // share of the animal that occluders may not hide
 
@@ -44,7 +54,8 @@ Light draw_light(const Domain& domain, const Ground& ground, const Backdrop& bac
 }
 
 // Puts something in front of the animal, unless it would hide too much of it.
-void occlude(cv::Mat& picture, cv::Mat1b& cover, const cv::Mat1b& silhouette, const Backdrop& backdrop, Rng& rng) {
+void occlude(cv::Mat& picture, cv::Mat1b& cover, const cv::Mat1b& silhouette, const Backdrop& backdrop,
+             Rng& rng) {
   const cv::Rect animal = cv::boundingRect(silhouette);
   const int count = 1 + (rng.chance(0.25) ? 1 : 0);
   for (int i = 0; i < count; ++i) {
@@ -63,8 +74,9 @@ bool covered_at(const cv::Mat1b& cover, const Eigen::Vector2d& px) {
   return cv::Rect({0, 0}, cover.size()).contains(at) && cover(at) != 0;
 }
 
-std::vector<SeenLandmark> look(const std::vector<Landmark>& landmarks, const std::vector<Eigen::Vector3f>& points,
-                               const AnimalLayer& animal, const PictureCamera& camera, const cv::Mat1b& cover) {
+std::vector<SeenLandmark> look(const std::vector<Landmark>& landmarks,
+                               const std::vector<Eigen::Vector3f>& points, const AnimalLayer& animal,
+                               const PictureCamera& camera, const cv::Mat1b& cover) {
   std::vector<float> tolerance;
   for (const Landmark& landmark : landmarks) tolerance.push_back(landmark.depth);
   const std::vector<std::uint8_t> hidden = animal.hidden(points, tolerance);
@@ -109,8 +121,8 @@ std::vector<Picture> PictureRenderer::render(std::span<const PicturePlan> plans)
   std::vector<Posture> postures;
   for (const PicturePlan& plan : plans) {
     Rng who = stream(plan, individual), when = stream(plan, moment);
-    subjects.push_back(draw_subject(species_table()[static_cast<std::size_t>(plan.species)], domain_of(plan.set),
-                                    model_.shapes(), who, when));
+    subjects.push_back(draw_subject(species_table()[static_cast<std::size_t>(plan.species)],
+                                    domain_of(plan.set), model_.shapes(), who, when));
     postures.push_back(subjects.back().posture);
   }
   const std::vector<Body> bodies = model_.pose(postures);
@@ -123,7 +135,8 @@ std::vector<Picture> PictureRenderer::render(std::span<const PicturePlan> plans)
 Picture PictureRenderer::render_one(const PicturePlan& plan, const Subject& subject, const Body& body) const {
   const Domain& domain = domain_of(plan.set);
   Rng rng = stream(plan, size);
-  const cv::Size2d units = domain.sizes[static_cast<std::size_t>(rng.below(static_cast<int>(domain.sizes.size())))];
+  const cv::Size2d units =
+      domain.sizes[static_cast<std::size_t>(rng.below(static_cast<int>(domain.sizes.size())))];
   Picture result;
   PictureTruth& truth = result.truth;
   truth.size_px = cv::Size(static_cast<int>(std::lround(units.width * picture_px_)),
@@ -143,7 +156,8 @@ Picture PictureRenderer::render_one(const PicturePlan& plan, const Subject& subj
 
   rng = stream(plan, surroundings);
   const Backdrop backdrop = draw_palette(subject.place, rng);
-  cv::Mat picture = paint_backdrop(backdrop, truth.size_px, camera, ground, truth.framing.translation.z(), noise_, rng);
+  cv::Mat picture =
+      paint_backdrop(backdrop, truth.size_px, camera, ground, truth.framing.translation.z(), noise_, rng);
   Rng sun = stream(plan, light);
   const Light sunlight = draw_light(domain, ground, backdrop, sun);
   animal.cast_shadow(picture, camera, ground, sunlight);
@@ -168,7 +182,8 @@ Picture PictureRenderer::render_one(const PicturePlan& plan, const Subject& subj
   std::copy(exact.begin(), exact.end(), truth.keypoints.begin());
   const auto seen = look(own, placed(own, body, truth.framing.translation), animal, camera, cover);
   rng = stream(plan, labels);
-  truth.labels = annotate(own, seen, std::max(truth.framing.box.width, truth.framing.box.height), domain.labels, rng);
+  truth.labels =
+      annotate(own, seen, std::max(truth.framing.box.width, truth.framing.box.height), domain.labels, rng);
   return result;
 }
 

@@ -43,7 +43,9 @@ class PictureRenderer {
   std::vector<Picture> render(std::span<const PicturePlan> plans) const;
 
   const BodyModel& model() const { return model_; }
-  const std::vector<Landmark>& landmarks(SetId set) const { return landmarks_[static_cast<std::size_t>(set)]; }
+  const std::vector<Landmark>& landmarks(SetId set) const {
+    return landmarks_[static_cast<std::size_t>(set)];
+  }
 
  private:
   Picture render_one(const PicturePlan& plan, const Subject& subject, const Body& body) const;

@@ -22,9 +22,10 @@ std::string with_underscores(std::string_view name) {
   return result;
 }
 
-// COCO's classes among ours; some pictures of Animal3D come from there.
+// COCO's classes among ours; some pictures of Animal3D come from there, all of those that ImageNet lacks.
 std::string_view coco_class(const Species& species) {
-  if (species.name == "horse" || species.name == "zebra" || species.name == "cow" || species.name == "sheep") {
+  if (species.name == "horse" || species.name == "zebra" || species.name == "cow" ||
+      species.name == "sheep") {
     return species.name;
   }
   return "";
@@ -36,7 +37,8 @@ std::string animal3d_name(const PicturePlan& plan, const Species& species, Rng& 
       fmt::format("images/{}/{}", plan.test ? "test" : "train", with_underscores(species.name));
   const int number = 2 * plan.index + (plan.test ? 1 : 0);
   const std::string_view coco = coco_class(species);
-  if (!coco.empty() && rng.chance(0.4)) return fmt::format("{}/{:012d}_{}.jpg", folder, 100000 + number, coco);
+  if (!coco.empty() && (coco == "cow" || rng.chance(0.4)))
+    return fmt::format("{}/{:012d}_{}.jpg", folder, 100000 + number, coco);
   return fmt::format("{}/{}_{}.JPEG", folder, species.synset, 1000 + number);
 }
 
@@ -62,7 +64,9 @@ std::string kingdom_name(const PicturePlan& plan, std::uint64_t seed) {
 void complete_paths(PicturePlan& plan) {
   const std::string_view folder = domain_of(plan.set).folder;
   const auto without = [](std::string_view path, std::string_view head) { return path.substr(head.size()); };
-  const auto as_png = [](std::string_view path) { return std::string(path.substr(0, path.rfind('.'))) + ".png"; };
+  const auto as_png = [](std::string_view path) {
+    return std::string(path.substr(0, path.rfind('.'))) + ".png";
+  };
   switch (plan.set) {
     case SetId::animal3d:
     case SetId::ctrlani3d:
@@ -116,7 +120,8 @@ std::vector<PicturePlan> plan_split(SetId set, bool test, double share, std::uin
   for (const Species& row : species) weights.push_back(row.frequency.*domain.frequency);
   const std::vector<int> counts = share_out(groups, weights);
   std::vector<int> shown;  // species of each group
-  for (std::size_t i = 0; i < counts.size(); ++i) shown.insert(shown.end(), static_cast<std::size_t>(counts[i]), static_cast<int>(i));
+  for (std::size_t i = 0; i < counts.size(); ++i)
+    shown.insert(shown.end(), static_cast<std::size_t>(counts[i]), static_cast<int>(i));
   const std::uint64_t split_key = 2 * static_cast<std::uint64_t>(set) + (test ? 1 : 0);
   Rng shuffle(seed, {split_key, order});
   for (int i = groups - 1; i > 0; --i) {
@@ -136,13 +141,19 @@ std::vector<PicturePlan> plan_split(SetId set, bool test, double share, std::uin
     const Species& row = species[static_cast<std::size_t>(plan.species)];
     Rng rng(seed, {split_key, naming, static_cast<std::uint64_t>(index)});
     switch (set) {
-      case SetId::animal3d: plan.image = animal3d_name(plan, row, rng); break;
-      case SetId::ctrlani3d: plan.image = ctrlani3d_name(plan, row); break;
+      case SetId::animal3d:
+        plan.image = animal3d_name(plan, row, rng);
+        break;
+      case SetId::ctrlani3d:
+        plan.image = ctrlani3d_name(plan, row);
+        break;
       case SetId::superanimal:
         plan.source = draw_source(row, rng);
         plan.image = source_file_name(plan.source, row, plan.image_id, rng);
         break;
-      case SetId::animal_kingdom: plan.image = kingdom_name(plan, seed); break;
+      case SetId::animal_kingdom:
+        plan.image = kingdom_name(plan, seed);
+        break;
     }
     complete_paths(plan);
     plans.push_back(std::move(plan));

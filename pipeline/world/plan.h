@@ -12,10 +12,11 @@ namespace q3d::pipeline::world {
 struct PicturePlan {
   SetId set = SetId::animal3d;
   bool test = false;
-  int index = 0;       // in its split
-  int species = 0;     // row of species_table()
-  int individual = 0;  // pictures with the same number show the same animal in the same place (frames of a film)
-  int source = -1;     // SuperAnimal: row of superanimal_sources()
+  int index = 0;    // in its split
+  int species = 0;  // row of species_table()
+  int individual =
+      0;            // pictures with the same number show the same animal in the same place (frames of a film)
+  int source = -1;  // SuperAnimal: row of superanimal_sources()
   int image_id = 0;    // SuperAnimal: global number of the picture
   std::string image;   // path below the set's folder, unique
   std::string listed;  // how the annotation file names it

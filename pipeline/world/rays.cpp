@@ -76,7 +76,9 @@ RayDevice::RayDevice() : handle_(std::make_unique<Handle>()) {
   }
 }
 
-RayDevice::~RayDevice() { rtcReleaseDevice(handle_->device); }
+RayDevice::~RayDevice() {
+  rtcReleaseDevice(handle_->device);
+}
 
 struct RayMesh::Handle {
   RTCScene scene = nullptr;
@@ -93,9 +95,11 @@ RayMesh::RayMesh(const RayDevice& device, std::span<const Eigen::Vector3f> verti
   rtcSetSceneBuildQuality(handle_->scene, RTC_BUILD_QUALITY_LOW);
   RTCGeometry geometry = rtcNewGeometry(rtc, RTC_GEOMETRY_TYPE_TRIANGLE);
   static_assert(sizeof(Eigen::Vector3f) == 12);
-  void* to = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, vertices.size());
+  void* to =
+      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, vertices.size());
   if (to != nullptr) std::memcpy(to, vertices.data(), vertices.size_bytes());
-  void* index = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, triangles.size());
+  void* index =
+      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, triangles.size());
   if (index != nullptr) std::memcpy(index, triangles.data(), triangles.size_bytes());
   rtcCommitGeometry(geometry);
   rtcAttachGeometry(handle_->scene, geometry);
@@ -112,8 +116,8 @@ RayMesh::~RayMesh() = default;
 
 void RayMesh::nearest(std::span<const Eigen::Vector3f> directions, std::span<SurfaceHit> hits) const {
   if (hits.size() != directions.size()) {
-    throw std::invalid_argument("nearest: " + std::to_string(directions.size()) + " directions but room for " +
-                                std::to_string(hits.size()) + " hits");
+    throw std::invalid_argument("nearest: " + std::to_string(directions.size()) +
+                                " directions but room for " + std::to_string(hits.size()) + " hits");
   }
   for (std::size_t begin = 0; begin < directions.size(); begin += kPacket) {
     const std::size_t count = std::min(kPacket, directions.size() - begin);

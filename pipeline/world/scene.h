@@ -7,8 +7,12 @@ namespace q3d::pipeline::world {
 
 using Colour = Eigen::Array3f;  // red, green, blue as a screen shows them, [0, 1]
 
-inline Colour rgb(int red, int green, int blue) { return Colour(red, green, blue) / 255.0F; }
-inline Colour blend(const Colour& a, const Colour& b, float t) { return a + (b - a) * t; }
+inline Colour rgb(int red, int green, int blue) {
+  return Colour(red, green, blue) / 255.0F;
+}
+inline Colour blend(const Colour& a, const Colour& b, float t) {
+  return a + (b - a) * t;
+}
 
 // A pinhole camera. Integer pixel coordinates are pixel centres, as in OpenCV's warps.
 struct PictureCamera {

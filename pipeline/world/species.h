@@ -31,14 +31,14 @@ struct Frequency {
 };
 
 struct Species {
-  std::string_view name;          // lower case, spaces
+  std::string_view name;  // lower case, spaces
   Family family;
   std::string_view synset;        // WordNet number, the first part of an ImageNet file name
   std::string_view kingdom_name;  // what Animal Kingdom calls it, and the group it puts it in
   std::string_view kingdom_group;
   Frequency frequency;
   Build build;
-  std::vector<Coat> coats;        // variants, equally frequent
+  std::vector<Coat> coats;  // variants, equally frequent
 };
 
 std::span<const Species> species_table();

@@ -3,107 +3,60 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <random>
+
+#include "smal/synthetic_motion.h"
 
 namespace q3d::pipeline::world {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
 
-// SMAL's joints. A leg is four joints from the body outwards.
-constexpr int kSpineFirst = 1, kSpineLast = 6, kNeck = 15, kHead = 16, kTailFirst = 25, kTailLast = 31, kJaw = 32,
-              kLeftEar = 33, kRightEar = 34;
-constexpr int kForeLegs[] = {7, 11};   // left, right
+// SMAL's joints. A leg is four joints from the body outwards, left before right.
+constexpr int kNeck = 15;
+constexpr int kForeLegs[] = {7, 11};
 constexpr int kHindLegs[] = {17, 21};
 constexpr int kLegJoints = 4;
 
-// At rest all joints share the body's axes (x to the head, y up, z to the right), so that a positive turn about z
-// swings a leg forwards and lifts the head, one about y turns the head to the left, one about x leans to the
-// right.
+bool is_leg(int joint) {
+  return (joint >= 7 && joint < 15) || (joint >= 17 && joint < 25);
+}
+
+// At rest all joints share the body's axes (x to the head, y up, z to the right), so that a positive turn
+// about z swings a leg forwards and lifts the head, one about y turns the head to the left, one about x leans
+// to the right.
 class Posing {
  public:
-  Posing(Stance& stance, const StanceHabits& habits, Rng& rng)
-      : stance_(stance), spread_(habits.spread), rng_(rng) {}
+  Posing(Stance& stance, Rng& rng) : stance_(stance), rng_(rng) {}
 
   void turn(int joint, int axis, double degrees) {
     stance_.pose[static_cast<std::size_t>(3 * joint + axis)] += static_cast<float>(degrees * kDegree);
   }
   void bend(int joint, double degrees) { turn(joint, 2, degrees); }
-  double about(double mean, double deviation) { return rng_.normal(mean, deviation * spread_); }
+  double about(double mean, double deviation) { return rng_.normal(mean, deviation); }
 
   // One leg's joints in turn, degrees about z, each a little off.
   void leg(int first, const double (&degrees)[kLegJoints], double deviation) {
     for (int i = 0; i < kLegJoints; ++i) bend(first + i, about(degrees[i], deviation));
   }
 
-  // A step: `phase` runs over one stride, `reach` is the swing of the upper leg.
-  void fore_step(int side, double phase, double reach) {
-    const double lifted = std::max(0.0, std::cos(phase));  // while the leg moves forwards
-    leg(kForeLegs[side], {reach * std::sin(phase), 0.9 * reach * lifted, -1.6 * reach * lifted, -0.6 * reach * lifted},
-        4.0);
-  }
-  void hind_step(int side, double phase, double reach) {
-    const double lifted = std::max(0.0, std::cos(phase));
-    leg(kHindLegs[side], {reach * std::sin(phase) + 0.4 * reach * lifted, -1.4 * reach * lifted,
-                          1.2 * reach * lifted, -0.6 * reach * lifted},
-        4.0);
-  }
-
-  void gait(double reach, bool bounding);
-  void loosen();
+  // A pose of the prior, its distance from the mean scaled; the legs only if wanted.
+  void add_motion(double spread, bool legs);
 
  private:
   Stance& stance_;
-  double spread_;
   Rng& rng_;
 };
 
-void Posing::gait(double reach, bool bounding) {
-  const double phase = rng_.uniform(0.0, 2.0 * std::numbers::pi);
-  // Walking and trotting move diagonal legs together; bounding moves the pairs.
-  const double pair = bounding ? rng_.uniform(0.1, 0.5) : std::numbers::pi;
-  const double hind = bounding ? std::numbers::pi * rng_.uniform(0.7, 1.3) : std::numbers::pi;
-  fore_step(0, phase, reach);
-  fore_step(1, phase + pair, reach);
-  hind_step(0, phase + hind, reach);
-  hind_step(1, phase + hind + pair, reach);
-  if (!bounding) return;
-  for (int joint = kSpineFirst; joint <= kSpineLast; ++joint) bend(joint, about(3.0 * std::sin(phase), 1.0));
-  stance_.lift = std::max(0.0, rng_.normal(0.02, 0.05));
-}
-
-// What every living animal adds: a turned head, a bent spine, legs not quite parallel, a moving tail and ears.
-void Posing::loosen() {
-  for (int joint = kSpineFirst; joint <= kSpineLast; ++joint) {
-    turn(joint, 1, about(0.0, 3.0));
-    bend(joint, about(0.0, 1.5));
-    turn(joint, 0, about(0.0, 1.0));
+void Posing::add_motion(double spread, bool legs) {
+  static const smal::MotionModel kModel = smal::synthetic_motion();
+  std::mt19937_64 random(rng_.next());
+  Eigen::VectorXd pose = kModel.mean + spread * (smal::sample_motion(kModel, random) - kModel.mean);
+  pose = pose.cwiseMax(kModel.lower).cwiseMin(kModel.upper);
+  for (int joint = 1; joint < kBodyJoints; ++joint) {
+    if (is_leg(joint) && !legs) continue;
+    for (int axis = 0; axis < 3; ++axis) turn(joint, axis, pose[3 * joint + axis] / kDegree);
   }
-  const double look = about(0.0, 16.0);
-  turn(kNeck, 1, 0.6 * look);
-  turn(kHead, 1, 0.6 * look + about(0.0, 8.0));
-  bend(kNeck, about(0.0, 9.0));
-  bend(kHead, about(0.0, 9.0));
-  turn(kHead, 0, about(0.0, 6.0));
-  for (int side = 0; side < 2; ++side) {
-    turn(kForeLegs[side], 0, about(0.0, 3.5));
-    turn(kHindLegs[side], 0, about(0.0, 3.5));
-  }
-  const double raised = about(0.0, 7.0), wag = about(0.0, 9.0);
-  for (int joint = kTailFirst; joint <= kTailLast; ++joint) {
-    bend(joint, 0.6 * raised + about(0.0, 4.0));
-    turn(joint, 1, 0.6 * wag + about(0.0, 4.0));
-  }
-  if (rng_.chance(0.3)) bend(kJaw, -std::abs(about(0.0, 12.0)));
-  const double ears = about(0.0, 12.0);
-  turn(kLeftEar, 0, ears + about(0.0, 5.0));
-  turn(kRightEar, 0, -ears + about(0.0, 5.0));
-}
-
-void head_down(Posing& posing) {
-  posing.bend(5, posing.about(-7.0, 3.0));
-  posing.bend(6, posing.about(-9.0, 3.0));
-  posing.bend(kNeck, posing.about(-42.0, 10.0));
-  posing.bend(kHead, posing.about(-8.0, 10.0));
 }
 
 void sit(Stance& stance, Posing& posing) {
@@ -165,18 +118,23 @@ void bow(Stance& stance, Posing& posing) {
 
 void extreme(Stance& stance, Posing& posing, Rng& rng) {
   switch (rng.below(4)) {
-    case 0: return rear(stance, posing);
-    case 1: return leap(stance, posing, rng);
-    case 2: return roll_over(stance, posing, rng);
-    default: return bow(stance, posing);
+    case 0:
+      return rear(stance, posing);
+    case 1:
+      return leap(stance, posing, rng);
+    case 2:
+      return roll_over(stance, posing, rng);
+    default:
+      return bow(stance, posing);
   }
 }
 
 }  // namespace
 
 Stance draw_stance(const StanceHabits& habits, Rng& rng) {
+  constexpr double kCalm = 0.6;  // a resting or straining animal's back, neck and tail move less
   Stance stance;
-  Posing posing(stance, habits, rng);
+  Posing posing(stance, rng);
   const double kind = rng.uniform();
   if (kind < habits.extreme) {
     extreme(stance, posing, rng);
@@ -184,14 +142,9 @@ Stance draw_stance(const StanceHabits& habits, Rng& rng) {
     sit(stance, posing);
   } else if (kind < habits.extreme + habits.resting) {
     lie(posing);
-  } else {
-    const double pace = rng.uniform();
-    if (pace < 0.35) posing.gait(posing.about(6.0, 2.0), false);        // standing
-    else if (pace < 0.75) posing.gait(posing.about(20.0, 4.0), false);  // walking, trotting
-    else posing.gait(posing.about(34.0, 6.0), rng.chance(0.6));         // running
-    if (pace < 0.6 && rng.chance(0.25)) head_down(posing);
   }
-  posing.loosen();
+  const bool ordinary = kind >= habits.extreme + habits.resting;
+  posing.add_motion(ordinary ? habits.spread : kCalm, ordinary);
   stance.pitch += rng.normal(0.0, 2.0) * kDegree;
   stance.roll += rng.normal(0.0, 1.5) * kDegree;
   return stance;

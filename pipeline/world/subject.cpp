@@ -14,7 +14,8 @@ Eigen::Matrix3d about(const Eigen::Vector3d& axis, double radians) {
   return Eigen::AngleAxisd(radians, axis).toRotationMatrix();
 }
 
-// Turn about the vertical between the animal's axis and the picture: 0 = seen from its right, head to the right.
+// Turn about the vertical between the animal's axis and the picture: 0 = seen from its right, head to the
+// right.
 double draw_yaw(double side_view, Rng& rng) {
   const double side = rng.chance(0.5) ? 0.0 : std::numbers::pi;
   return rng.chance(side_view) ? side + rng.normal(0.0, 26.0) * kDegree
@@ -34,7 +35,8 @@ Place draw_place(const std::array<double, kPlaces>& weights, Rng& rng) {
 
 }  // namespace
 
-Subject draw_subject(const Species& species, const Domain& domain, const ShapeSpace& shapes, Rng& who, Rng& when) {
+Subject draw_subject(const Species& species, const Domain& domain, const ShapeSpace& shapes, Rng& who,
+                     Rng& when) {
   Subject subject;
   subject.posture.betas = shapes.draw(species, who);
   subject.coat = draw_coat(species, who);
@@ -47,7 +49,8 @@ Subject draw_subject(const Species& species, const Domain& domain, const ShapeSp
 
   // Body (x to the head, y up, z right) -> camera (x right, y down, z forward), seen from the right at yaw 0;
   // then the camera goes up by `high` and tilts by `roll`.
-  const Eigen::Vector3d x = Eigen::Vector3d::UnitX(), y = Eigen::Vector3d::UnitY(), z = Eigen::Vector3d::UnitZ();
+  const Eigen::Vector3d x = Eigen::Vector3d::UnitX(), y = Eigen::Vector3d::UnitY(),
+                        z = Eigen::Vector3d::UnitZ();
   const double high =
       std::clamp(when.normal(domain.camera_high_deg, domain.camera_high_spread_deg), -4.0, 50.0) * kDegree;
   const double roll = std::clamp(when.normal(0.0, 2.5), -8.0, 8.0) * kDegree;

@@ -78,15 +78,21 @@ int draw_source(const Species& species, Rng& rng) {
 
 std::string source_file_name(int source, const Species& species, int image_id, Rng& rng) {
   switch (source) {
-    case awa: return fmt::format("{}_{}_{}.jpg", with_plus(species.name), 10000 + rng.below(1900), image_id);
-    case ap10k: return fmt::format("{:012d}_{}.jpg", 40000 + image_id, image_id);
-    case animalpose: return fmt::format("2{:03d}_{:06d}_{}.jpg", 7 + rng.below(5), image_id, image_id);
-    case stanford_dogs: return fmt::format("{}_{}_{}.jpg", species.synset, 60000 + image_id, image_id);
-    case cheetah: return fmt::format("images/run{}_f{:05d}_{}.jpg", 1 + rng.below(9), rng.below(400), image_id);
+    case awa:
+      return fmt::format("{}_{}_{}.jpg", with_plus(species.name), 10000 + rng.below(1900), image_id);
+    case ap10k:
+      return fmt::format("{:012d}_{}.jpg", 40000 + image_id, image_id);
+    case animalpose:
+      return fmt::format("2{:03d}_{:06d}_{}.jpg", 7 + rng.below(5), image_id, image_id);
+    case stanford_dogs:
+      return fmt::format("{}_{}_{}.jpg", species.synset, 60000 + image_id, image_id);
+    case cheetah:
+      return fmt::format("images/run{}_f{:05d}_{}.jpg", 1 + rng.below(9), rng.below(400), image_id);
     case horse:
-      return fmt::format("/data/quadruped80k/images/Sample{}_{:04d}_{}.jpg", 1 + rng.below(30), rng.below(250),
-                         image_id);
-    default: throw std::invalid_argument("source_file_name: no source " + std::to_string(source));
+      return fmt::format("/data/quadruped80k/images/Sample{}_{:04d}_{}.jpg", 1 + rng.below(30),
+                         rng.below(250), image_id);
+    default:
+      throw std::invalid_argument("source_file_name: no source " + std::to_string(source));
   }
 }
 

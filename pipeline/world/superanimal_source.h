@@ -1,5 +1,5 @@
-// The collections that make up SuperAnimal-Quadruped: each labels its own part of the 39 keypoints and has its
-// own habits of naming, boxes and codes for a missing point.
+// The collections that make up SuperAnimal-Quadruped: each labels its own part of the 39 keypoints and has
+// its own habits of naming, boxes and codes for a missing point.
 #pragma once
 
 #include <span>
@@ -13,11 +13,11 @@
 namespace q3d::pipeline::world {
 
 struct SuperAnimalSource {
-  std::string_view name;  // of the collection, as in "source_dataset"
-  std::vector<int> covers;  // which of the 39 it has; the others are -1, -1, -1
+  std::string_view name;         // of the collection, as in "source_dataset"
+  std::vector<int> covers;       // which of the 39 it has; the others are -1, -1, -1
   bool missing_is_zero = false;  // a point of its own that is not labelled: 0, 0, 0 instead of -1, -1, -1
   int labelled_v = 2;
-  bool keypoint_box = false;     // no box of its own: made from the keypoints, 20 px wider, cut at 0 only
+  bool keypoint_box = false;  // no box of its own: made from the keypoints, 20 px wider, cut at 0 only
 };
 
 std::span<const SuperAnimalSource> superanimal_sources();

@@ -22,11 +22,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kVersion = 1;    // of what the same options give
-constexpr int kChunk = 64;     // pictures whose bodies are computed together
+constexpr int kVersion = 1;  // of what the same options give
+constexpr int kChunk = 64;   // pictures whose bodies are computed together
 constexpr const char* kUnfinished = ".unfinished-world";
-constexpr std::array<const char*, 6> kFolders{"animal3d",       "control_animal3dlatest", "superanimal_quadruped",
-                                              "animal_kingdom", "truth",                  "assets"};
+constexpr std::array<const char*, 6> kFolders{
+    "animal3d", "control_animal3dlatest", "superanimal_quadruped", "animal_kingdom", "truth", "assets"};
 
 void check(const WorldOptions& options) {
   const auto refuse = [](const std::string& what) { throw std::invalid_argument("world: " + what); };
@@ -37,11 +37,14 @@ void check(const WorldOptions& options) {
   if (!(options.share > 0.0 && options.share <= 1000.0)) {
     refuse(fmt::format("share is {}, expected more than 0 and at most 1000", options.share));
   }
-  if (options.threads < 0) refuse(fmt::format("threads is {}, expected 0 (all cores) or more", options.threads));
+  if (options.threads < 0)
+    refuse(fmt::format("threads is {}, expected 0 (all cores) or more", options.threads));
 }
 
 nlohmann::json options_of(const WorldOptions& options) {
-  return {{"version", kVersion}, {"seed", options.seed}, {"picture_px", options.picture_px},
+  return {{"version", kVersion},
+          {"seed", options.seed},
+          {"picture_px", options.picture_px},
           {"share", options.share}};
 }
 
@@ -51,10 +54,12 @@ std::optional<nlohmann::json> finished_world(const WorldOptions& options) {
   if (!fs::exists(file)) return std::nullopt;
   const auto found = nlohmann::json::parse(manifests::read_file(file), nullptr, false);
   if (found.is_discarded() || found.value("options", nlohmann::json()) != options_of(options)) {
-    throw std::runtime_error(fmt::format(
-        "world: {} holds another world (its options: {}; wanted: {}); choose another folder or remove this one",
-        options.out.string(), found.is_discarded() ? "unreadable" : found.value("options", nlohmann::json()).dump(),
-        options_of(options).dump()));
+    throw std::runtime_error(
+        fmt::format("world: {} holds another world (its options: {}; wanted: {}); choose another folder or "
+                    "remove this one",
+                    options.out.string(),
+                    found.is_discarded() ? "unreadable" : found.value("options", nlohmann::json()).dump(),
+                    options_of(options).dump()));
   }
   return found.at("pictures");
 }
@@ -65,9 +70,10 @@ void clear_unfinished(const fs::path& out) {
   for (const char* folder : kFolders) {
     if (!fs::exists(out / folder)) continue;
     if (!fs::exists(marker)) {
-      throw std::runtime_error(fmt::format("world: {} already holds {}, which is not part of a world; choose another "
-                                           "folder",
-                                           out.string(), folder));
+      throw std::runtime_error(
+          fmt::format("world: {} already holds {}, which is not part of a world; choose another "
+                      "folder",
+                      out.string(), folder));
     }
     fs::remove_all(out / folder);
   }
@@ -97,10 +103,12 @@ void write_annotations(const fs::path& out, SetId set, bool test, std::span<cons
     case SetId::animal3d:
     case SetId::ctrlani3d:
       write_json(out / folder / (split + ".json"),
-                 prima_annotations(pictures, fmt::format("Rendered quadrupeds in the format of {}, {} set", folder, split)));
+                 prima_annotations(pictures, fmt::format("Rendered quadrupeds in the format of {}, {} set",
+                                                         folder, split)));
       return;
     case SetId::superanimal:
-      write_json(out / folder / "annotations" / (split + ".json"), superanimal_annotations(pictures, superanimal));
+      write_json(out / folder / "annotations" / (split + ".json"),
+                 superanimal_annotations(pictures, superanimal));
       break;
     case SetId::animal_kingdom:
       write_json(out / folder / "annotation" / "ak_P3_mammal" / (split + ".json"),
@@ -113,7 +121,8 @@ void write_annotations(const fs::path& out, SetId set, bool test, std::span<cons
 class Run {
  public:
   explicit Run(const WorldOptions& options)
-      : options_(options), arena_(options.threads == 0 ? tbb::task_arena::automatic : options.threads),
+      : options_(options),
+        arena_(options.threads == 0 ? tbb::task_arena::automatic : options.threads),
         renderer_(options.seed, options.picture_px) {}
 
   void save_asset(const fs::path& path) const { renderer_.model().save(path); }
@@ -132,7 +141,8 @@ class Run {
       if (plans.empty()) continue;
       summary.pictures[split_name(plans.front())] = static_cast<int>(plans.size());
       const std::vector<FinishedPicture> finished = render(plans);
-      write_annotations(options_.out, plans.front().set, plans.front().test, finished, renderer_.landmarks(SetId::superanimal));
+      write_annotations(options_.out, plans.front().set, plans.front().test, finished,
+                        renderer_.landmarks(SetId::superanimal));
     }
     return summary;
   }
@@ -175,9 +185,11 @@ WorldSummary make_world(const WorldOptions& options) {
   check(options);
   fs::create_directories(options.out);
   const manifests::FolderLock lock(options.out);
-  const fs::path asset = options.asset.empty() ? options.out / "assets" / "smal_synthetic.safetensors" : options.asset;
+  const fs::path asset =
+      options.asset.empty() ? options.out / "assets" / "smal_synthetic.safetensors" : options.asset;
   if (const auto pictures = finished_world(options)) {
-    WorldSummary summary{.pictures = pictures->get<std::map<std::string, int>>(), .reused = true, .asset = asset};
+    WorldSummary summary{
+        .pictures = pictures->get<std::map<std::string, int>>(), .reused = true, .asset = asset};
     for (const auto& [split, count] : summary.pictures) summary.total += count;
     return summary;
   }

@@ -1,12 +1,13 @@
-// The synthetic world: rendered quadrupeds with known truth, written in the native layouts of the four datasets.
+// The synthetic world: rendered quadrupeds with known truth, written in the native layouts of the four
+// datasets.
 //
 //   OUT/world.json                                        options and counts; written last
 //   OUT/animal3d/{train,test}.json, images/, masks/       with 3D truth
 //   OUT/control_animal3dlatest/...                        likewise, cleaner
 //   OUT/superanimal_quadruped/annotations/{train,test}.json, images/
 //   OUT/animal_kingdom/annotation/ak_P3_mammal/test.json, dataset/<VIDEO>/
-//   OUT/truth/*.json, masks/                              what is true of the 2D-only sets, for evaluation alone
-//   OUT/assets/smal_synthetic.safetensors                 the body model
+//   OUT/truth/*.json, masks/                              what is true of the 2D-only sets, for evaluation
+//   alone OUT/assets/smal_synthetic.safetensors                 the body model
 #pragma once
 
 #include <cstdint>
@@ -20,9 +21,9 @@ namespace q3d::pipeline::world {
 struct WorldOptions {
   std::filesystem::path out;
   std::uint64_t seed = 0;
-  int picture_px = 320;  // longer side of a photograph; Animal Kingdom's frames are twice as wide
-  double share = 1.0;    // of the default number of pictures (docs: domain.cpp)
-  int threads = 0;       // 0 = one for each core; never changes a byte
+  int picture_px = 320;         // longer side of a photograph; Animal Kingdom's frames are twice as wide
+  double share = 1.0;           // of the default number of pictures (docs: domain.cpp)
+  int threads = 0;              // 0 = one for each core; never changes a byte
   std::filesystem::path asset;  // where the body model goes; empty = below out
   std::function<void(int done, int total)> progress;  // called from the calling thread
 };
@@ -34,8 +35,8 @@ struct WorldSummary {
   std::filesystem::path asset;
 };
 
-// Renders the world into options.out. A folder that holds a finished world of the same options is left as it is;
-// what a killed run left is made anew. Throws std::invalid_argument on options out of range and
+// Renders the world into options.out. A folder that holds a finished world of the same options is left as it
+// is; what a killed run left is made anew. Throws std::invalid_argument on options out of range and
 // std::runtime_error when the folder holds anything else, is in use or cannot be written.
 WorldSummary make_world(const WorldOptions& options);
 

@@ -187,6 +187,7 @@ TEST(Load, a_file_that_cannot_be_read_names_itself_the_place_and_what_was_expect
   EXPECT_THAT(cut, HasSubstr("byte "));
   EXPECT_THAT(cut, HasSubstr("cut short"));
   EXPECT_THAT(thrown_by(folder, "prima", ""), HasSubstr("cut short"));
+  EXPECT_LT(thrown_by(folder, "prima", "{\"data\": \"" + std::string(100'000, 'x')).size(), 800U);
   EXPECT_THAT(thrown_by(folder, "prima", "version https://git-lfs.github.com/spec/v1\n"),
               HasSubstr("git lfs pull"));
   EXPECT_THAT(thrown_by(folder, "prima", "<html>quota</html>"), HasSubstr("line 1, byte 1"));
@@ -210,6 +211,18 @@ TEST(Load, ids_are_unique_also_when_annotation_ids_are_not) {
   for (const auto& record : folder.load("superanimal", document).records) ids.insert(record.id);
   EXPECT_EQ(ids, (std::set<std::string>{"set/train/horse_11361_0.png#0", "set/train/horse_11361_0.png#1",
                                         "set/train/horse_11361_0.png#2"}));
+}
+
+TEST(Load, ids_and_messages_stay_on_one_line_and_in_utf8) {
+  const Folder folder;
+  json record = prima_record("images/line\nbreak\u0001.png");
+  std::string long_text(59, 'x');
+  for (int i = 0; i < 40; ++i) long_text += "\u00e4";  // two bytes each: byte 60 is inside one
+  json other = prima_record();
+  other["supercategory"] = long_text;
+  const Dataset dataset = folder.load_prima({record, other});
+  EXPECT_EQ(dataset.records[0].id, "set/train/images/line_break_.png#0");
+  EXPECT_NO_THROW(json(dataset.records[1].failure_detail).dump());
 }
 
 // What each broken value of a field must lead to. "@" in the JSON stands for a literal that JSON does not

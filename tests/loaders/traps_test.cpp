@@ -169,7 +169,7 @@ TEST(Traps, trap_09_images_without_an_annotation_are_noted_and_points_outside_ar
   ASSERT_EQ(dataset.records.size(), 1U);
   EXPECT_EQ(dataset.records[0].failure, Reason::none) << dataset.records[0].failure_detail;
   EXPECT_EQ(dataset.records[0].keypoints[24].x_px, -5.0);
-  EXPECT_THAT(joined(dataset.notes), HasSubstr("1 images have no annotation"));
+  EXPECT_THAT(joined(dataset.notes), HasSubstr("images without an annotation: 1"));
 }
 
 TEST(Traps, trap_10_exif_does_not_turn_the_picture) {
@@ -206,7 +206,7 @@ TEST(Traps, trap_12_case_plus_and_endings) {
   EXPECT_EQ(dataset.records[1].species, "siamese cat");
   EXPECT_EQ(dataset.records[2].failure, Reason::image_missing);
   EXPECT_THAT(dataset.records[2].failure_detail, HasSubstr("could be"));
-  EXPECT_THAT(joined(dataset.notes), HasSubstr("2 picture names differ"));
+  EXPECT_THAT(joined(dataset.notes), HasSubstr(".jpeg: 2"));
 }
 
 TEST(Traps, trap_13_absolute_names_of_the_authors_disk) {
@@ -222,7 +222,7 @@ TEST(Traps, trap_13_absolute_names_of_the_authors_disk) {
   EXPECT_EQ(dataset.records[0].id, "set/train/horse_11361_0.png#7");
   EXPECT_EQ(dataset.records[1].failure, Reason::none) << dataset.records[1].failure_detail;
   EXPECT_EQ(dataset.records[2].failure, Reason::path_escapes_root);
-  EXPECT_THAT(joined(dataset.notes), HasSubstr("1 picture names are absolute paths of another disk"));
+  EXPECT_THAT(joined(dataset.notes), HasSubstr("found by their last parts: 1"));
 }
 
 TEST(Traps, trap_13_equal_base_names_are_told_apart_by_their_folders) {
@@ -244,7 +244,8 @@ TEST(Traps, trap_13_two_names_for_one_file_are_noted) {
   json document = superanimal_document(2);
   document["images"][0]["file_name"] = "/disk/x/horse_11361_0.png";
   document["images"][1]["file_name"] = "/disk/y/horse_11361_0.png";
-  EXPECT_THAT(joined(folder.load("superanimal", document).notes), HasSubstr("1 of these name a file"));
+  EXPECT_THAT(joined(folder.load("superanimal", document).notes),
+              HasSubstr("names too (one must be wrong): 1"));
 }
 
 TEST(Traps, trap_13_links) {

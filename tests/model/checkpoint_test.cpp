@@ -23,7 +23,9 @@ std::string bytes_of(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
 }
 
-bool mentions(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+bool mentions(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
 
 class Checkpoint : public ::testing::Test {
  protected:
@@ -82,7 +84,7 @@ TEST_F(Checkpoint, EveryFaultIsNamedAtOnce) {
   tensors_["backbone.last_norm.bias"] = torch::zeros({config_.embed_dim}, torch::kInt32);
   const std::string message = refusal(tensors_);
   EXPECT_TRUE(mentions(message, "changed.safetensors")) << message;
-  EXPECT_TRUE(mentions(message, "5 tensors")) << message;
+  EXPECT_TRUE(mentions(message, "5 faults")) << message;
   EXPECT_TRUE(mentions(message, "backbone.cls_token: missing")) << message;
   EXPECT_TRUE(mentions(message, "smal_head.decpose.2.bias: missing")) << message;
   EXPECT_TRUE(mentions(message, "smal_head.stray: not part")) << message;
@@ -164,8 +166,8 @@ TEST_F(Checkpoint, InitialSpreadFollowsTheFanIn) {
   EXPECT_NEAR(tensors_.at("smal_head.keypoint_2d_embeddings.weight").std().item<double>(), 0.02, 0.001);
 }
 
-// The checkpoint that the authors released, by names and shapes: a full-size network holds exactly its tensors,
-// but for the extras that need not be loaded.
+// The checkpoint that the authors released, by names and shapes: a full-size network holds exactly its
+// tensors, but for the extras that need not be loaded.
 TEST(OfficialNames, FullSizeNetworkHasThemAll) {
   std::ifstream stream(testing::data_dir() / "official_state_dict.json");
   const auto official = nlohmann::json::parse(stream);

@@ -15,8 +15,9 @@ using testing::expect_close;
 
 constexpr double kTolerance = 1e-5;
 
-// Sampling multiplies the noise of a 2D keypoint (4e-7) by 16 cells and by the step between neighbouring cells
-// (about 4): up to 3e-5 in the tokens from there on. Outputs and everything before stay within kTolerance.
+// Sampling multiplies the noise of a 2D keypoint (4e-7) by 16 cells and by the step between neighbouring
+// cells (about 4): up to 3e-5 in the tokens from there on. Outputs and everything before stay within
+// kTolerance.
 constexpr double kSampledTolerance = 5e-5;
 
 std::map<std::string, torch::Tensor> as_official(const Prediction& prediction) {
@@ -45,7 +46,9 @@ class ForwardParity : public ::testing::TestWithParam<std::string> {
   std::map<std::string, torch::Tensor> observe_all() const {
     const torch::NoGradGuard no_grad;
     std::map<std::string, torch::Tensor> seen;
-    const Observer observe = [&](const std::string& name, const torch::Tensor& tensor) { seen[name] = tensor; };
+    const Observer observe = [&](const std::string& name, const torch::Tensor& tensor) {
+      seen[name] = tensor;
+    };
     const ImageFeatures features = prima_.net().encode(images_, observe);
     seen["backbone_feat"] = features.image_tokens.transpose(1, 2).unflatten(2, {kTokenRows, kTokenColumns});
     seen["bio_token"] = features.bio_token;

@@ -34,11 +34,16 @@ class PrimaTest : public ::testing::Test {
 
   static void expect_finite(const Prediction& prediction, std::int64_t batch) {
     const std::vector<std::pair<torch::Tensor, std::vector<std::int64_t>>> parts{
-        {prediction.rotations, {batch, 35, 3, 3}},       {prediction.betas, {batch, 41}},
-        {prediction.camera, {batch, 3}},                 {prediction.translation, {batch, 3}},
-        {prediction.keypoints_3d, {batch, 26, 3}},       {prediction.keypoints_2d, {batch, 26, 2}},
-        {prediction.aux_keypoints_2d, {batch, 26, 2}},   {prediction.aux_keypoints_3d, {batch, 26, 3}},
-        {prediction.init_betas, {batch, 41}},            {prediction.shape_feature, {batch, 128}}};
+        {prediction.rotations, {batch, 35, 3, 3}},
+        {prediction.betas, {batch, 41}},
+        {prediction.camera, {batch, 3}},
+        {prediction.translation, {batch, 3}},
+        {prediction.keypoints_3d, {batch, 26, 3}},
+        {prediction.keypoints_2d, {batch, 26, 2}},
+        {prediction.aux_keypoints_2d, {batch, 26, 2}},
+        {prediction.aux_keypoints_3d, {batch, 26, 3}},
+        {prediction.init_betas, {batch, 41}},
+        {prediction.shape_feature, {batch, 128}}};
     for (const auto& [tensor, shape] : parts) {
       EXPECT_EQ(tensor.sizes(), at::IntArrayRef(shape));
       EXPECT_TRUE(tensor.isfinite().all().item<bool>());

@@ -36,7 +36,8 @@ const Golden& golden(const std::string& which) {
 }
 
 // One sample of an adapted batch, under the official names.
-std::map<std::string, torch::Tensor> as_official(const Prima& prima, const Prediction& batch, std::int64_t i) {
+std::map<std::string, torch::Tensor> as_official(const Prima& prima, const Prediction& batch,
+                                                 std::int64_t i) {
   const auto row = [i](const torch::Tensor& tensor) { return tensor.narrow(0, i, 1); };
   const torch::Tensor vertices = prima.body().forward(row(batch.rotations), row(batch.betas)).vertices;
   return {{"betas", batch.betas[i]},
@@ -54,9 +55,9 @@ torch::Tensor without_last(const std::vector<double>& curve) {
   return torch::tensor(std::vector<double>(curve.begin(), curve.end() - 1), torch::kFloat64);
 }
 
-// The change from the unadapted output, within 2 % of itself: as a whole, and in nine of ten elements (2e-6 is the
-// float32 noise of a difference of two outputs). The tenth is for joints whose 6D columns are nearly parallel:
-// they turn rounding errors into some 1e-4 of rotation.
+// The change from the unadapted output, within 2 % of itself: as a whole, and in nine of ten elements (2e-6
+// is the float32 noise of a difference of two outputs). The tenth is for joints whose 6D columns are nearly
+// parallel: they turn rounding errors into some 1e-4 of rotation.
 void expect_same_change(const std::string& name, const torch::Tensor& got, const torch::Tensor& before,
                         const torch::Tensor& expected) {
   SCOPED_TRACE(name);
@@ -67,8 +68,8 @@ void expect_same_change(const std::string& name, const torch::Tensor& got, const
   EXPECT_GE((error <= 0.02 * moved + 2e-6).to(torch::kFloat64).mean().item<double>(), 0.9);
 }
 
-// How far the official float32 run is from a float64 one: a table with an entry for ten fast iterations of each
-// sample. Longer runs are no nearer.
+// How far the official float32 run is from a float64 one: a table with an entry for ten fast iterations of
+// each sample. Longer runs are no nearer.
 double golden_noise(const std::string& which, TtaObjective objective, std::int64_t sample,
                     const std::string& name) {
   static std::map<std::string, nlohmann::json> cache;
@@ -77,8 +78,8 @@ double golden_noise(const std::string& which, TtaObjective objective, std::int64
     std::ifstream file(testing::parity_dir() / ("tta_" + which + ".json"));
     tables = nlohmann::json::parse(file).at("meta").at("fp32_vs_fp64_max_abs");
   }
-  const std::string run = (objective == TtaObjective::demo ? "demo" : "paper") +
-                          ("_lr1e-3_n10_s" + std::to_string(sample)) + "_";
+  const std::string run =
+      (objective == TtaObjective::demo ? "demo" : "paper") + ("_lr1e-3_n10_s" + std::to_string(sample)) + "_";
   const std::map<std::string, std::string> aliases{
       {"vertices_every32", "pred_vertices"}, {"global_orient", "pose"}, {"pred_cam_t", "pred_cam"}};
   const auto alias = aliases.find(name);

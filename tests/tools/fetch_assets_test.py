@@ -13,6 +13,7 @@ from unittest import mock
 import support  # first of ours: it sets the path
 import fetch_assets
 import prima_import
+import safetensors_file
 import smal_import
 
 PRIMA, BIOCLIP = "/MLAdaptiveIntelligence/PRIMA/", "/imageomics/bioclip/"
@@ -83,8 +84,9 @@ class FetchTest(unittest.TestCase):
     def importer(self, name):
         def run(*arguments, **options):
             *sources, target, _ = arguments
-            self.imported.append((name, [os.path.basename(path) for path in sources], options))
-            pathlib.Path(target).write_bytes(b"imported")
+            sources = [os.path.basename(path) for path in sources]
+            self.imported.append((name, sources, options))
+            safetensors_file.write(target, {}, {"imported_from": ", ".join(sources)})
 
         return run
 
@@ -122,10 +124,14 @@ class FetchTest(unittest.TestCase):
         self.fetch()
         self.assertEqual([name for name, *_ in self.imported], ["import_body"])
 
-    def test_older_published_names(self):
+    def test_another_stage_under_an_older_published_name(self):
+        self.fetch()
         self.hub.publish(PRIMA, "s3ckpt.ckpt", b"stage 3")
-        code, _, _ = self.fetch("--stage", "3")
-        self.assertEqual((code, self.imported[0][1]), (0, ["s3ckpt.ckpt"]))
+        for options, source in ((("--stage", "3"), "s3ckpt.ckpt"), ((), "s1ckpt_inference.ckpt")):
+            code, _, _ = self.fetch(*options)
+            self.assertEqual((code, [entry[1] for entry in self.imported]), (0, [[source]]))
+
+    def test_files_for_training(self):
         code, out, _ = self.fetch("--training")
         self.assertEqual(code, 1)
         self.assertIn("MLAdaptiveIntelligence/PRIMA has no file named amr_vitbb.pth", out)

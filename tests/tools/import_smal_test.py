@@ -40,7 +40,7 @@ class BodyTest(AssetCase):
             "v_template": rng.normal(size=(VERTICES, 3)),
             "f": rng.integers(0, VERTICES, (FACES, 3)).astype(np.uint32),
             "shapedirs": rng.normal(size=(VERTICES, 3, BETAS)),
-            "posedirs": rng.normal(size=(VERTICES, 3, 9 * (JOINTS - 1))).astype(np.float32),
+            "posedirs": rng.normal(size=(VERTICES, 3, 9 * (JOINTS - 1))).astype(np.float16),
             "weights": weights / weights.sum(1, keepdims=True),
             "J_regressor": regressor,
             "kintree_table": np.stack([parents, np.arange(JOINTS, dtype=np.uint32)]),
@@ -95,7 +95,7 @@ class BodyTest(AssetCase):
         for vertex, axis, entry in ((0, 0, 0), (17, 2, 305), (3888, 1, 100)):
             got = tensors["posedirs"][entry, 3 * vertex + axis]
             self.assertEqual(got, self.numbers["posedirs"][vertex, axis, entry])
-        self.assertEqual((metadata["format"], metadata["name"]), ("quadruped3d-smal-1", "SMAL, from model.pkl"))
+        self.assertEqual((metadata["format"], metadata["imported_from"]), ("quadruped3d-smal-1", "model.pkl"))
         self.assertIn("non-commercial", metadata["licence"])
         self.assertIn("3889 vertices", out)
 
@@ -137,6 +137,7 @@ class BodyTest(AssetCase):
             ({"v_template": self.numbers["v_template"][:-1]}, "v_template has the shape [3888, 3], expected [3889, 3]"),
             ({"weights": "none"}, "weights is a str, expected an array"),
             (changed("v_template", (7, 1), np.nan), "v_template holds a number that is not finite"),
+            (changed("v_template", (7, 1), 1e39), "v_template holds a number that is not finite in float32"),
             (changed("f", (0, 0), VERTICES), "f holds 0 to 3889, expected whole numbers from 0 to 3888"),
             (changed("weights", 9, 0.5), "lbs_weights: row 9 sums to 17.5, expected 1"),
             (changed("J_regressor", 3, 0), "J_regressor: row 3 sums to 0, expected 1"),
@@ -187,6 +188,7 @@ class PriorsTest(AssetCase):
         self.assertEqual((code, err), (0, ""))
         tensors, metadata = support.read_safetensors(self.target)
         self.assertEqual(metadata["format"], "quadruped3d-priors-1")
+        self.assertEqual(metadata["imported_from"], "families.pkl, pose.pkl")
         np.testing.assert_array_equal(tensors["shape_prior_loss.mean_betas"], self.means.astype(np.float32))
         np.testing.assert_array_equal(tensors["pose_prior_loss.mean_pose"], self.mean_pose.astype(np.float32))
         np.testing.assert_array_equal(tensors["pose_prior_loss.precs"], self.factor.astype(np.float32))

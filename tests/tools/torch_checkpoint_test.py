@@ -9,7 +9,6 @@ import tempfile
 import unittest
 import zipfile
 
-import numpy as np
 import support  # first of ours: it sets the path
 import torch
 from restricted_pickle import RefusedPickle
