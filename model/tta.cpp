@@ -131,8 +131,9 @@ class Adaptation {
     const std::vector<bool> goes_on = record(iterate);
     ++taken_;
     if (std::find(goes_on.begin(), goes_on.end(), true) != goes_on.end()) {
-      // One gradient for all: no operation mixes instances, so each one's stays its own.
-      slots_.step(torch::autograd::grad({iterate.loss.sum()}, leaves), options_.learning_rate);
+      // The gradient of the sum of losses: no operation mixes instances, so each one's stays its own.
+      slots_.step(torch::autograd::grad({iterate.loss}, leaves, {torch::ones_like(iterate.loss)}),
+                  options_.learning_rate);
     }
     for (std::int64_t slot = slots_.size() - 1; slot >= 0; --slot) {
       if (!goes_on[static_cast<std::size_t>(slot)]) slots_.remove(slot);

@@ -1,0 +1,73 @@
+#include "tests/model/parity_net.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "model/device.h"
+#include "model/net.h"
+#include "tests/support/parity_smal.h"
+#include "tests/support/paths.h"
+
+namespace q3d::testing {
+
+smal::SafeTensors parity_file(const std::string& name) {
+  return smal::SafeTensors::open(parity_dir() / (name + ".safetensors"));
+}
+
+model::PrimaConfig parity_config(const std::string& which) {
+  const std::filesystem::path path = parity_dir() / ("weights_" + which + ".json");
+  std::ifstream stream(path);
+  if (!stream) throw std::runtime_error(path.string() + ": cannot open");
+  const nlohmann::json meta = nlohmann::json::parse(stream).at("meta");
+  const nlohmann::json& sizes = meta.at("config");
+  const smal::SafeTensors weights = parity_file("weights_" + which);
+  const auto rows = [&](const std::string& name) { return weights.tensor(name).size(0); };
+
+  model::PrimaConfig config;
+  config.embed_dim = sizes.at("embed_dim");
+  config.depth = sizes.at("depth");
+  config.heads = sizes.at("heads");
+  config.mlp_ratio = rows("backbone.blocks.0.mlp.fc1.weight") / config.embed_dim;
+  config.clip_width = sizes.at("clip_width");
+  config.clip_layers = sizes.at("clip_layers");
+  config.clip_heads = meta.at("clip_heads");
+  config.clip_out = sizes.at("clip_out");
+  config.dec_dim = sizes.at("dec_dim");
+  config.dec_layers = sizes.at("dec_layers");
+  config.dec_heads = sizes.at("dec_heads");
+  config.dec_ffn = rows("smal_head.layers.0.ffn.0.weight");
+  config.ief_iterations = sizes.at("ief");
+  config.focal_px = parity_file("forward_" + which).tensor("focal_length")[0][0].item<double>();
+  return config;
+}
+
+model::Prima parity_prima(const std::string& which) { return parity_prima(which, parity_config(which)); }
+
+model::Prima parity_prima(const std::string& which, const model::PrimaConfig& config) {
+  model::configure_compute(1);  // a network this small only loses time to a second thread
+  const smal::SmalAsset asset = load_parity_asset(parity_dir());
+  auto net = model::load_net(parity_file("weights_" + which), config, asset, {});
+  net->eval();
+  for (auto& parameter : net->parameters()) parameter.set_requires_grad(false);
+  return {net, smal::SmalBody(asset)};
+}
+
+torch::Tensor parity_images(const model::Prima& prima, const torch::Tensor& index) {
+  const torch::Tensor crops = parity_file("inputs").tensor("images_u8");
+  return prima.normalise(crops.index_select(0, index.to(torch::kInt64)));
+}
+
+void expect_close(const std::string& name, const torch::Tensor& got, const torch::Tensor& expected,
+                  double tolerance) {
+  SCOPED_TRACE(name);
+  ASSERT_TRUE(got.defined());
+  ASSERT_EQ(got.sizes(), expected.sizes());
+  ASSERT_TRUE(got.isfinite().all().item<bool>());
+  const double worst = (got.to(torch::kFloat64) - expected.to(torch::kFloat64)).abs().max().item<double>();
+  EXPECT_LE(worst, tolerance);
+}
+
+}  // namespace q3d::testing

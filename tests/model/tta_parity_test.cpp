@@ -1,0 +1,140 @@
+// Test-time adaptation against numbers computed by the official code, one by one and in one batch.
+#include <gtest/gtest.h>
+
+#include <map>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "model/tta.h"
+#include "tests/model/parity_net.h"
+
+namespace q3d::model {
+namespace {
+
+using testing::expect_close;
+
+struct Golden {
+  smal::SafeTensors file;
+  Prima prima;
+  ImageFeatures features;
+  torch::Tensor keypoints;
+};
+
+const Golden& golden(const std::string& which) {
+  static std::map<std::string, Golden> cache;
+  const auto known = cache.find(which);
+  if (known != cache.end()) return known->second;
+  const Prima prima = testing::parity_prima(which);
+  const smal::SafeTensors file = testing::parity_file("tta_" + which);
+  const torch::Tensor images = testing::parity_images(prima, file.tensor("input_index"));
+  return cache.emplace(which, Golden{file, prima, prima.encode(images), file.tensor("gt_keypoints")})
+      .first->second;
+}
+
+// One sample of an adapted batch, under the official names.
+std::map<std::string, torch::Tensor> as_official(const Prima& prima, const Prediction& batch, std::int64_t i) {
+  const auto row = [i](const torch::Tensor& tensor) { return tensor.narrow(0, i, 1); };
+  const torch::Tensor vertices = prima.body().forward(row(batch.rotations), row(batch.betas)).vertices;
+  return {{"betas", batch.betas[i]},
+          {"pose", batch.rotations[i].narrow(0, 1, 34)},
+          {"global_orient", batch.rotations[i].narrow(0, 0, 1)},
+          {"pred_cam", batch.camera[i]},
+          {"pred_cam_t", batch.translation[i]},
+          {"pred_keypoints_2d", batch.keypoints_2d[i]},
+          {"inter_keypoints_2d", batch.aux_keypoints_2d[i]},
+          {"vertices_every32", vertices[0].slice(0, 0, {}, 32)}};
+}
+
+// The iterates before each step: the official curves lack the one after the last.
+torch::Tensor without_last(const std::vector<double>& curve) {
+  return torch::tensor(std::vector<double>(curve.begin(), curve.end() - 1), torch::kFloat64);
+}
+
+// float32 noise of the outputs, twice over: a change is the difference of two of them (noise tables of the
+// fixtures, 1e-6 for most).
+constexpr double kChangeNoise = 2e-6;
+
+// The change from the unadapted output, within 2 % of itself: each element's but for noise, and the whole.
+void expect_same_change(const std::string& name, const torch::Tensor& got, const torch::Tensor& before,
+                        const torch::Tensor& expected) {
+  SCOPED_TRACE(name);
+  const torch::Tensor moved = (expected.to(torch::kFloat64) - before.to(torch::kFloat64)).abs();
+  const torch::Tensor error = (got.to(torch::kFloat64) - expected.to(torch::kFloat64)).abs();
+  EXPECT_LE((error - 0.02 * moved).max().item<double>(), kChangeNoise);
+  EXPECT_LE(error.norm().item<double>(), 0.02 * moved.norm().item<double>());
+}
+
+using Case = std::tuple<std::string, TtaObjective, std::string, int>;  // fixture, objective, lr, iterations
+
+class TtaParity : public ::testing::TestWithParam<Case> {
+ protected:
+  std::string prefix(std::int64_t sample) const {
+    const auto& [which, objective, rate, iterations] = GetParam();
+    return std::string(objective == TtaObjective::demo ? "demo" : "paper") + "_lr" + rate + "_n" +
+           std::to_string(iterations) + "_s" + std::to_string(sample) + "_";
+  }
+
+  TtaResult adapt_samples(std::int64_t first, std::int64_t count) const {
+    const auto& [which, objective, rate, iterations] = GetParam();
+    const Golden& data = golden(which);
+    TtaOptions options;
+    options.objective = objective;
+    options.learning_rate = std::stod(rate);
+    TtaSchedule schedule;
+    schedule.iterations = iterations;
+    const ImageFeatures features{data.features.image_tokens.narrow(0, first, count),
+                                 data.features.bio_token.narrow(0, first, count)};
+    return adapt(data.prima, features, data.keypoints.narrow(0, first, count),
+                 std::vector<TtaSchedule>(static_cast<std::size_t>(count), schedule), options);
+  }
+
+  // `row` of the result against the golden sample.
+  void check(const TtaResult& result, std::int64_t row, std::int64_t sample) const {
+    const auto& [which, objective, rate, iterations] = GetParam();
+    const Golden& data = golden(which);
+    SCOPED_TRACE(prefix(sample));
+    const auto expected = [&](const std::string& name) { return data.file.tensor(prefix(sample) + name); };
+    for (const auto& [name, tensor] : as_official(data.prima, result.last, row)) {
+      if (name == "vertices_every32") {
+        expect_close(name, tensor, expected(name), 1e-4);
+      } else if (rate == "1e-6") {
+        expect_same_change(name, tensor, data.file.tensor("before_" + name)[sample], expected(name));
+      } else {
+        expect_close(name, tensor, expected(name), 5e-4);
+      }
+    }
+    const auto index = static_cast<std::size_t>(row);
+    ASSERT_EQ(result.loss[index].size(), static_cast<std::size_t>(iterations) + 1);
+    expect_close("loss", without_last(result.loss[index]), expected("loss"), 1e-4);
+    if (objective == TtaObjective::paper) {
+      expect_close("l_proj", without_last(result.l_proj[index]), expected("loss_reproj_raw"), 1e-4);
+    }
+  }
+};
+
+TEST_P(TtaParity, OneByOne) {
+  const std::int64_t samples = golden(std::get<0>(GetParam())).keypoints.size(0);
+  for (std::int64_t i = 0; i < samples; ++i) check(adapt_samples(i, 1), 0, i);
+}
+
+TEST_P(TtaParity, AllInOneBatch) {
+  const std::int64_t samples = golden(std::get<0>(GetParam())).keypoints.size(0);
+  const TtaResult result = adapt_samples(0, samples);
+  for (std::int64_t i = 0; i < samples; ++i) check(result, i, i);
+}
+
+std::string case_name(const ::testing::TestParamInfo<Case>& info) {
+  const auto& [which, objective, rate, iterations] = info.param;
+  return which + (objective == TtaObjective::demo ? "Demo" : "Paper") + (rate == "1e-6" ? "Slow" : "Fast") +
+         std::to_string(iterations);
+}
+
+INSTANTIATE_TEST_SUITE_P(Fixtures, TtaParity,
+                         ::testing::Combine(::testing::Values("A", "B"),
+                                            ::testing::Values(TtaObjective::demo, TtaObjective::paper),
+                                            ::testing::Values("1e-6", "1e-3"), ::testing::Values(10, 30)),
+                         case_name);
+
+}  // namespace
+}  // namespace q3d::model
