@@ -98,8 +98,8 @@ bool is_allowed_extra(const std::string& name) {
   static constexpr std::array<std::string_view, 7> kTextTower{
       "transformer.", "token_embedding.", "positional_embedding", "ln_final.",
       "text_projection", "logit_scale",   "attn_mask"};
-  static constexpr std::array<std::string_view, 4> kOthers{"smal.", "discriminator.", "shape_prior_loss.",
-                                                           "pose_prior_loss."};
+  static constexpr std::array<std::string_view, 5> kOthers{"smal.", "discriminator.", "shape_prior_loss.",
+                                                           "pose_prior_loss.", "training."};
   const std::string_view view(name);
   const auto starts = [](std::string_view text) {
     return [text](std::string_view prefix) { return text.substr(0, prefix.size()) == prefix; };

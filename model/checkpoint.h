@@ -28,7 +28,7 @@ struct TensorSpec {
 std::vector<TensorSpec> expected_tensors(const PrimaConfig& config);
 
 // True for what a checkpoint may carry although the network does not hold it: CLIP's text tower,
-// discriminator.*, the priors, `initialized` and smal.*.
+// discriminator.*, the priors, `initialized`, smal.* and training.*, the state of a training run.
 bool is_allowed_extra(const std::string& name);
 
 // The config in the file's metadata. Throws std::runtime_error when it is absent or not valid.

@@ -28,8 +28,8 @@ torch::Tensor position_encoding(std::int64_t width) {
 }
 
 // Weight of each of `count` cells for a coordinate in [-0.5, 0.5] along one axis: (B, N) -> (B, N, count).
-// Linear interpolation between cell centres is a hat function round each centre; outside the grid the hats are
-// missing, which is zero padding.
+// Linear interpolation between cell centres is a hat function round each centre; outside the grid the hats
+// are missing, which is zero padding.
 torch::Tensor hat_weights(const torch::Tensor& coordinate, std::int64_t count) {
   const torch::Tensor cell = (coordinate * 2.0 + 1.0) * (static_cast<double>(count) / 2.0) - 0.5;
   const torch::Tensor centres = torch::arange(count, coordinate.options());
@@ -103,7 +103,10 @@ struct Decoder::KeypointUpdate {
   torch::Tensor augment_3d;    // (B, 26, D)
 };
 
-Decoder::Decoder(const PrimaConfig& config, const Placement& placement) : rounds_(config.ief_iterations) {
+Decoder::Decoder(const PrimaConfig& config, const Placement& placement)
+    : rounds_(config.ief_iterations),
+      betas_from_bio_(config.betas_from_bio),
+      has_keypoint_tokens_(config.keypoint_tokens) {
   const std::int64_t width = config.dec_dim;
   const Placement exact = placement.in_float32();
   const auto embedding = [&](const std::string& name) {
@@ -119,8 +122,8 @@ Decoder::Decoder(const PrimaConfig& config, const Placement& placement) : rounds
   bio_to_betas_init_ = mlp("bio_to_betas_init", config.embed_dim, 256, kBetas, exact, 0.2);
   shape_projector_ = mlp("shape_projector", kBetas, 128, 128, exact);
   const auto to_token = register_module("param_to_token", std::make_shared<torch::nn::Module>());
-  param_to_token_ = to_token->register_module(
-      "0", std::make_shared<Linear>(kPose6d + kBetas + kCamera, width, exact));
+  param_to_token_ =
+      to_token->register_module("0", std::make_shared<Linear>(kPose6d + kBetas + kCamera, width, exact));
   param_to_token_norm_ =
       to_token->register_module("1", std::make_shared<LayerNorm>(width, kNormEpsilon, placement));
   keypoint_2d_embeddings_ = embedding("keypoint_2d_embeddings");
@@ -132,8 +135,7 @@ Decoder::Decoder(const PrimaConfig& config, const Placement& placement) : rounds
   kp2d_from_tokens_ = mlp("kp2d_from_tokens", width, width, 2, placement);
   kp3d_from_tokens_ = mlp("kp3d_from_tokens", width, width, 3, placement);
   if (config.embed_dim != width) {
-    image_proj_ =
-        register_module("image_proj", std::make_shared<Linear>(config.embed_dim, width, placement));
+    image_proj_ = register_module("image_proj", std::make_shared<Linear>(config.embed_dim, width, placement));
   }
   position_ = position_encoding(width).to(placement.device);
   const auto layers = register_module("layers", std::make_shared<torch::nn::Module>());
@@ -161,6 +163,9 @@ DecoderMemory Decoder::remember(const torch::Tensor& image_tokens, const Observe
 }
 
 torch::Tensor Decoder::initial_betas(const torch::Tensor& bio_token) const {
+  if (!betas_from_bio_) {
+    return torch::zeros({bio_token.size(0), kBetas}, bio_token.options().dtype(torch::kFloat32));
+  }
   return bio_to_betas_init_->forward(bio_token);
 }
 
@@ -179,8 +184,7 @@ Decoder::KeypointUpdate Decoder::update_keypoints(const torch::Tensor& tokens,
   KeypointUpdate update;
   update.keypoints_2d = torch::tanh(kp2d_from_tokens_->forward(tokens.narrow(1, 1, kKeypoints))) * 0.5;
   update.augment_2d = keypoint_2d_pos_encoder_->forward(update.keypoints_2d);
-  update.features_2d =
-      sample_grid(sampled_source, update.keypoints_2d) + keypoint_2d_feat_linear_->bias;
+  update.features_2d = sample_grid(sampled_source, update.keypoints_2d) + keypoint_2d_feat_linear_->bias;
   update.keypoints_3d = kp3d_from_tokens_->forward(tokens.narrow(1, 1 + kKeypoints, kKeypoints));
   // The position encoder sees the keypoints relative to the mean of the first two (the eyes).
   const torch::Tensor centre = update.keypoints_3d.narrow(1, 0, 2).mean(1, /*keepdim=*/true);
@@ -193,7 +197,8 @@ torch::Tensor Decoder::parameter_token(const DecoderOutput& estimate) const {
   return torch::relu(param_to_token_norm_->forward(param_to_token_->forward(values)));
 }
 
-// tokens (B, 53, D) through all layers -> the parameter token (B, D). Notes the keypoints on the way.
+// tokens (B, 53, D), or (B, 1, D) without keypoint tokens, through all layers -> the parameter token (B, D).
+// Notes the keypoints on the way.
 torch::Tensor Decoder::run_layers(torch::Tensor tokens, const DecoderMemory& memory, DecoderOutput& estimate,
                                   const std::string& prefix, const Observer& observe) const {
   for (std::size_t i = 0; i < layers_.size(); ++i) {
@@ -202,6 +207,7 @@ torch::Tensor Decoder::run_layers(torch::Tensor tokens, const DecoderMemory& mem
     tokens = layers_[i]->forward(tokens, memory.keys_values[i], last && !observe ? 1 : 0);
     if (observe) observe(prefix + "layer" + std::to_string(i) + "_tokens", tokens);
     if (last) break;
+    if (!has_keypoint_tokens_) continue;
     const KeypointUpdate update = update_keypoints(tokens, memory.sampled);
     if (observe) {
       const std::string name = prefix + "upd" + std::to_string(i) + "_";
@@ -218,29 +224,38 @@ torch::Tensor Decoder::run_layers(torch::Tensor tokens, const DecoderMemory& mem
   return norm_->forward(tokens.select(1, 0));
 }
 
+torch::Tensor Decoder::initial_tokens(const DecoderOutput& estimate,
+                                      const AdaptedParameters& parameters) const {
+  const torch::Tensor parameter = parameter_token(estimate).unsqueeze(1);
+  if (!has_keypoint_tokens_) return parameter;
+  const auto for_each = [&](const torch::Tensor& embeddings) {
+    return embeddings.expand({parameter.size(0), kKeypoints, embeddings.size(-1)});
+  };
+  return torch::cat(
+      {parameter, for_each(parameters.keypoint_2d_embeddings), for_each(parameters.keypoint_3d_embeddings)},
+      1);
+}
+
 DecoderOutput Decoder::refine(const DecoderMemory& memory, const torch::Tensor& initial_betas,
                               const AdaptedParameters& parameters, const Observer& observe) const {
   const std::int64_t batch = initial_betas.size(0);
-  const auto for_each = [batch](const torch::Tensor& embeddings) {
-    return embeddings.expand({batch, kKeypoints, embeddings.size(-1)});
-  };
   DecoderOutput estimate;
   estimate.pose_6d = init_pose_.expand({batch, -1});
   estimate.betas = initial_betas;
   estimate.camera = init_cam_.expand({batch, -1});
+  if (!has_keypoint_tokens_) {
+    estimate.aux_keypoints_2d = torch::zeros({batch, kKeypoints, 2}, initial_betas.options());
+    estimate.aux_keypoints_3d = torch::zeros({batch, kKeypoints, 3}, initial_betas.options());
+  }
   for (std::int64_t round = 0; round < rounds_; ++round) {
     const std::string prefix = "ief" + std::to_string(round) + "_";
-    const torch::Tensor parameter = parameter_token(estimate);
-    const torch::Tensor tokens =
-        torch::cat({parameter.unsqueeze(1), for_each(parameters.keypoint_2d_embeddings),
-                    for_each(parameters.keypoint_3d_embeddings)},
-                   1);
+    const torch::Tensor tokens = initial_tokens(estimate, parameters);
     const torch::Tensor readout = run_layers(tokens, memory, estimate, prefix, observe);
     const torch::Tensor pose_change = apply_mlp(parameters.pose_head, readout);
     const torch::Tensor betas_change = apply_mlp(parameters.shape_head, readout);
     const torch::Tensor camera_change = apply_mlp(parameters.camera_head, readout);
     if (observe) {
-      observe(prefix + "param_token_in", parameter);
+      observe(prefix + "param_token_in", tokens.select(1, 0));
       observe(prefix + "param_token_out", readout);
       observe(prefix + "delta_decpose", pose_change);
       observe(prefix + "delta_decshape", betas_change);

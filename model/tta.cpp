@@ -87,7 +87,8 @@ bool wants_to_stop(const TtaSchedule& schedule, const std::vector<double>& l_pro
   const int taken = static_cast<int>(l_proj.size()) - 1;
   if (taken >= schedule.iterations) return true;
   if (schedule.stop_below > 0.0 && l_proj.back() < schedule.stop_below) return true;
-  return schedule.min_gain > 0.0 && taken == schedule.gain_window && relative_gain(l_proj) < schedule.min_gain;
+  return schedule.min_gain > 0.0 && taken == schedule.gain_window &&
+         relative_gain(l_proj) < schedule.min_gain;
 }
 
 // The active instances at one iterate.
@@ -132,12 +133,23 @@ class Adaptation {
     ++taken_;
     if (std::find(goes_on.begin(), goes_on.end(), true) != goes_on.end()) {
       // The gradient of the sum of losses: no operation mixes instances, so each one's stays its own.
-      slots_.step(torch::autograd::grad({iterate.loss}, leaves, {torch::ones_like(iterate.loss)}),
-                  options_.learning_rate);
+      slots_.step(gradients(iterate.loss, leaves), options_.learning_rate);
     }
     for (std::int64_t slot = slots_.size() - 1; slot >= 0; --slot) {
       if (!goes_on[static_cast<std::size_t>(slot)]) slots_.remove(slot);
     }
+  }
+
+  // Zeros where a leaf has no part in the loss: the embeddings of a network without keypoint tokens.
+  static std::vector<torch::Tensor> gradients(const torch::Tensor& loss,
+                                              const std::vector<torch::Tensor>& leaves) {
+    auto result =
+        torch::autograd::grad({loss}, leaves, {torch::ones_like(loss)}, /*retain_graph=*/std::nullopt,
+                              /*create_graph=*/false, /*allow_unused=*/true);
+    for (std::size_t i = 0; i < leaves.size(); ++i) {
+      if (!result[i].defined()) result[i] = torch::zeros_like(leaves[i]);
+    }
+    return result;
   }
 
   bool any_step_left() const {
@@ -151,8 +163,7 @@ class Adaptation {
     const torch::AutoGradMode mode(with_gradient);
     const DecoderOutput output =
         decoder().refine(slots_.memory(), slots_.initial_betas(), from_list(parameters));
-    const torch::Tensor projected =
-        projected_keypoints(prima_.body(), output, prima_.config().focal_px);
+    const torch::Tensor projected = projected_keypoints(prima_.body(), output, prima_.config().focal_px);
     const KeypointTargets targets = slots_.targets();
     Iterate iterate;
     iterate.loss = objective(options_, projected, output.aux_keypoints_2d, targets);
@@ -178,7 +189,8 @@ class Adaptation {
       std::vector<double>& l_proj = result_.l_proj[instance];
       result_.loss[instance].push_back(rows[0][slot]);
       accepted.push_back(slot);
-      if (l_proj.empty() || rows[1][slot] < l_proj[static_cast<std::size_t>(result_.best_iteration[instance])]) {
+      if (l_proj.empty() ||
+          rows[1][slot] < l_proj[static_cast<std::size_t>(result_.best_iteration[instance])]) {
         improved.push_back(slot);
         result_.best_iteration[instance] = taken_;
       }
