@@ -15,22 +15,28 @@ struct Thresholds {
   int iterations_min = 10;
   int iterations_max = 60;
 };
-// Throws std::invalid_argument unless 0 < tau_low <= tau_high, 0 <= delta < 1 and the iterations are ordered.
+// Throws std::invalid_argument naming the threshold unless 0 < tau_low <= tau_high, 0 <= delta < 1,
+// gain_window >= 1 and 1 <= iterations_min <= iterations_max.
 void check(const Thresholds& thresholds);
 
 enum class Band { retain, refine, discard };
 
-// By the initial L_proj: below tau_low, the middle band, tau_high and above.
+// By the initial L_proj: below tau_low, the middle band [tau_low, tau_high), tau_high and above (NaN too).
 Band band(double initial_error, const Thresholds& thresholds);
 
-// round(min + (max - min) (L0 - tau_low) / (tau_high - tau_low)) for a sample of the middle band.
+// round(min + (max - min) (L0 - tau_low) / (tau_high - tau_low)), halves up. Throws std::invalid_argument for
+// a sample outside the middle band.
 int adaptation_iterations(double initial_error, const Thresholds& thresholds);
 
-// Verdict of a sample that was not adapted (retained, or discarded as error_too_large).
+// Verdict without adaptation: retained below tau_low, else discarded (error_too_large from tau_high on; a
+// sample of the middle band has shown no gain, so gain_too_small until judge_adapted has seen its curve). A
+// non-finite error is a failure (prediction_not_finite).
 manifests::Judgement judge_initial(double initial_error, const Thresholds& thresholds);
 
-// Verdict after adaptation, from L_proj of iterates 0..n. A curve that falls below tau_low has passed; else
-// the relative gain within the first gain_window iterations must reach delta.
+// Verdict after adaptation, from L_proj of iterates 0..n of a sample that the caller sent to adaptation. A
+// curve that falls below tau_low has passed; else the relative gain (L0 - min over iterates 1..gain_window) /
+// L0 must reach delta. The kept iterate is the first of least L_proj, iterate 0 included. Iterates that are
+// not finite are passed over; a curve that is empty or starts with one is a failure (prediction_not_finite).
 manifests::Judgement judge_adapted(std::span<const double> curve, const Thresholds& thresholds);
 
 }  // namespace q3d::filters

@@ -31,14 +31,16 @@ Result check(Result result, const std::string& what) {
 
 class Handle {
  public:
-  // Takes ownership of `id`, which `close` will close. Throws as above when it is negative.
-  Handle(hid_t id, herr_t (*close)(hid_t), const std::string& what) : id_(check(id, what)), close_(close) {}
+  // Takes ownership of `id`, which `closer` will close. Throws as above when it is negative.
+  Handle(hid_t id, herr_t (*closer)(hid_t), const std::string& what) : id_(check(id, what)), close_(closer) {}
   ~Handle() {
     if (id_ >= 0) close_(id_);
   }
   Handle(Handle&& other) noexcept : id_(std::exchange(other.id_, -1)), close_(other.close_) {}
   Handle& operator=(Handle&&) = delete;
   hid_t get() const { return id_; }
+  // Closes now; throws as above when that fails, which for a file means that it is incomplete.
+  void close(const std::string& what) { check(close_(std::exchange(id_, -1)), what); }
 
  private:
   hid_t id_;

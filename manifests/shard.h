@@ -8,14 +8,16 @@
 #include <vector>
 
 #include "manifests/sample.h"
+#include "manifests/table_reader.h"
 #include "manifests/verdict.h"
 
 namespace q3d::manifests {
 
 inline constexpr int kShardSchema = 1;
 
-// One labelled sample. Pixel quantities are of the source image unless they say otherwise; crop units are
-// those of the network's crop (side 1, range [-0.5, 0.5]).
+// One labelled sample. Its record comes back from a shard without absolute paths. Pixel quantities are of the
+// source image unless they say otherwise; crop units are those of the network's crop (side 1, range [-0.5,
+// 0.5]).
 struct ShardSample {
   SampleRecord record;
   std::string image_sha256;  // digest of the source file
@@ -32,8 +34,9 @@ struct ShardSample {
   std::array<double, 6> crop_from_image{};  // 2x3 affine, image px -> stored-crop px
   std::array<double, 3> patch_box{};        // centre x, centre y, side: the network's square crop, image px
 
-  // The label. Rotations are matrices; trans and keypoints_3d are in the camera frame of the 256-px crop
-  // (x right, y down, z forward), SMAL units, focal 1000 px at 256 px.
+  // The label. Rotations are matrices. trans and keypoints_3d are in the axes of the 256-px crop's camera
+  // (x right, y down, z forward), SMAL units, focal 1000 px at 256 px; trans is not yet added to
+  // keypoints_3d.
   bool has_pose = false;
   bool has_betas = false;
   bool has_keypoints_3d = false;
@@ -53,16 +56,37 @@ struct ShardHeader {
   std::string image_encoding;  // "jpeg", "png" or "reference"
 };
 
-// Writes one shard atomically and returns its SHA-256. Throws std::runtime_error.
+// Writes one shard atomically and returns its SHA-256. Equal input gives equal bytes. Absolute paths are not
+// written. Throws std::runtime_error naming the path (disk full, ...) and std::invalid_argument naming the
+// sample when it cannot be in a shard: a failed record, or a crop where the header says "reference" and the
+// reverse.
 std::string write_shard(const std::filesystem::path& path, const ShardHeader& header,
                         const std::vector<ShardSample>& samples);
+
+// An open shard. Reads take no lock and may run in many threads at once.
+class ShardReader {
+ public:
+  // Checks magic, schema and completeness, in that order, and refuses what it does not know.
+  // Throws std::runtime_error naming path, dataset, got, expected and what to do.
+  explicit ShardReader(const std::filesystem::path& path);
+
+  const ShardHeader& header() const { return header_; }
+  std::int64_t rows() const { return table_.rows(); }
+  // Single columns of some rows, for whoever needs only those.
+  const TableReader& table() const { return table_; }
+  // Rows [first, first + count), whole. Throws std::out_of_range for rows that the shard lacks and
+  // std::runtime_error naming path, column and row for a value that schema 1 does not know.
+  std::vector<ShardSample> samples(std::int64_t first, std::int64_t count) const;
+
+ private:
+  ShardHeader header_;
+  TableReader table_;
+};
 
 struct Shard {
   ShardHeader header;
   std::vector<ShardSample> samples;
 };
-// Checks magic, schema and completeness, in that order, and refuses what it does not know.
-// Throws std::runtime_error naming path, dataset, got and expected.
-Shard read_shard(const std::filesystem::path& path);
+Shard read_shard(const std::filesystem::path& path);  // all of it; throws as ShardReader
 
 }  // namespace q3d::manifests

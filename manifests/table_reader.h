@@ -13,6 +13,10 @@
 
 namespace q3d::manifests {
 
+// The text attributes alone: what must be known before the columns are looked at (format, schema). Throws
+// std::runtime_error naming the path when it is not a readable HDF5 file.
+std::map<std::string, std::string> read_table_attributes(const std::filesystem::path& path);
+
 // HDF5 is used only to find out where each column lies, in the constructor. The rows themselves are then read
 // from the file directly, so reads take no lock, may run in many threads, and survive a fork.
 class TableReader {

@@ -1,15 +1,14 @@
-// Composes the HDF5 file in memory and writes it like any other file. HDF5 itself never touches the disk: a
-// full disk then fails in one write(2) with its reason, instead of inside the library's cache, which 1.10
-// cannot close cleanly afterwards.
+// Composes the HDF5 file in anonymous memory and then writes it like any other file. A full disk thus fails
+// in our own write(2), with its reason, and never inside the library's cache, which HDF5 1.10 cannot close
+// cleanly afterwards; and the digest needs no second pass over the disk.
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <bit>
 #include <stdexcept>
 
 #include "manifests/atomic_file.h"
 #include "manifests/digest.h"
-#include "manifests/hdf5.h"
+#include "manifests/hdf5_memory_file.h"
 #include "manifests/table.h"
 
 namespace q3d::manifests {
@@ -17,8 +16,6 @@ namespace {
 
 using hdf5::check;
 using hdf5::Handle;
-
-static_assert(std::endian::native == std::endian::little, "shards are little-endian");
 
 constexpr std::size_t kMaxAttributeBytes = 60'000;  // HDF5 keeps attributes below 64 KiB in the object header
 constexpr std::size_t kMaxRank = 8;
@@ -101,61 +98,15 @@ Handle text_type(std::size_t width) {
   return type;
 }
 
-// An HDF5 file in memory.
-class Image {
- public:
-  explicit Image(std::size_t expected_bytes) {
-    const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, "file access properties");
-    check(H5Pset_fapl_core(access.get(), expected_bytes, false), "in-memory file");
-    check(H5Pset_libver_bounds(access.get(), H5F_LIBVER_V18, H5F_LIBVER_V18), "library version bounds");
-    const Handle creation(H5Pcreate(H5P_FILE_CREATE), H5Pclose, "file creation properties");
-    check(H5Pset_obj_track_times(creation.get(), false), "no times");
-    // HDF5 first looks whether the name exists on disk; no name below /dev/null ever does.
-    file_.emplace_back(H5Fcreate("/dev/null/table", H5F_ACC_TRUNC, creation.get(), access.get()), H5Fclose,
-                       "in-memory file");
-  }
-
-  void attribute(const std::string& name, hid_t type, const void* value) {
-    const Handle space(H5Screate(H5S_SCALAR), H5Sclose, name);
-    const Handle attribute(
-        H5Acreate2(file_[0].get(), name.c_str(), type, space.get(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose,
-        name);
-    check(H5Awrite(attribute.get(), type, value), name);
-  }
-
-  void dataset(const std::string& name, hid_t type, const std::vector<hsize_t>& extents, const void* data) {
-    const Handle space(H5Screate_simple(static_cast<int>(extents.size()), extents.data(), nullptr), H5Sclose,
-                       name);
-    const Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose, name);
-    check(H5Pset_layout(creation.get(), H5D_CONTIGUOUS), name);
-    check(H5Pset_obj_track_times(creation.get(), false), name);
-    const Handle dataset(
-        H5Dcreate2(file_[0].get(), name.c_str(), type, space.get(), H5P_DEFAULT, creation.get(), H5P_DEFAULT),
-        H5Dclose, name);
-    check(H5Dwrite(dataset.get(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data), name);
-  }
-
-  std::vector<std::byte> bytes() const {
-    check(H5Fflush(file_[0].get(), H5F_SCOPE_GLOBAL), "flush");
-    const ssize_t size = check(H5Fget_file_image(file_[0].get(), nullptr, 0), "file image");
-    std::vector<std::byte> image(static_cast<std::size_t>(size));
-    check(H5Fget_file_image(file_[0].get(), image.data(), image.size()), "file image");
-    return image;
-  }
-
- private:
-  std::vector<Handle> file_;  // one
-};
-
-void write_attributes(Image& image, const Table& table) {
-  image.attribute("rows", H5T_STD_I64LE, &table.rows);
+void write_attributes(hdf5::MemoryFile& file, const Table& table) {
+  file.attribute("rows", H5T_STD_I64LE, &table.rows);
   for (const auto& [name, value] : table.attributes) {
     const Handle type = text_type(value.size());
-    image.attribute(name, type.get(), value.c_str());
+    file.attribute(name, type.get(), value.c_str());
   }
 }
 
-void write_text(Image& image, const std::string& name, const std::vector<std::string>& values) {
+void write_text(hdf5::MemoryFile& file, const std::string& name, const std::vector<std::string>& values) {
   std::size_t width = 1;
   for (std::size_t row = 0; row < values.size(); ++row) {
     width = std::max(width, values[row].size());
@@ -166,41 +117,33 @@ void write_text(Image& image, const std::string& name, const std::vector<std::st
   std::string padded(values.size() * width, '\0');
   for (std::size_t row = 0; row < values.size(); ++row) values[row].copy(&padded[row * width], width);
   const Handle type = text_type(width);
-  image.dataset(name, type.get(), {values.size()}, padded.data());
+  file.dataset(name, type.get(), {values.size()}, padded.data());
 }
 
-void write_blobs(Image& image, const std::string& name, const std::vector<std::vector<std::byte>>& values) {
+void write_blobs(hdf5::MemoryFile& file, const std::string& name,
+                 const std::vector<std::vector<std::byte>>& values) {
   std::vector<std::int64_t> offsets{0};
   std::vector<std::byte> flat;
   for (const auto& value : values) {
     flat.insert(flat.end(), value.begin(), value.end());
     offsets.push_back(static_cast<std::int64_t>(flat.size()));
   }
-  image.dataset(name, H5T_STD_U8LE, {flat.size()}, flat.data());
-  image.dataset(name + "_offsets", H5T_STD_I64LE, {offsets.size()}, offsets.data());
-}
-
-std::size_t payload_bytes(const Table& table) {
-  std::size_t total = 1 << 16;
-  for (const auto& [name, column] : table.numeric) total += column.data.size();
-  for (const auto& [name, values] : table.blobs) {
-    for (const auto& value : values) total += value.size() + sizeof(std::int64_t);
-  }
-  return total;
+  file.dataset(name, H5T_STD_U8LE, {flat.size()}, flat.data());
+  file.dataset(name + "_offsets", H5T_STD_I64LE, {offsets.size()}, offsets.data());
 }
 
 std::vector<std::byte> compose(const Table& table) {
   const hdf5::Session session;
-  Image image(payload_bytes(table));
-  write_attributes(image, table);
+  hdf5::MemoryFile file;
+  write_attributes(file, table);
   for (const auto& [name, column] : table.numeric) {
     std::vector<hsize_t> extents{static_cast<hsize_t>(table.rows)};
     extents.insert(extents.end(), column.row_shape.begin(), column.row_shape.end());
-    image.dataset(name, stored_type(column.type), extents, column.data.data());
+    file.dataset(name, stored_type(column.type), extents, column.data.data());
   }
-  for (const auto& [name, values] : table.text) write_text(image, name, values);
-  for (const auto& [name, values] : table.blobs) write_blobs(image, name, values);
-  return image.bytes();
+  for (const auto& [name, values] : table.text) write_text(file, name, values);
+  for (const auto& [name, values] : table.blobs) write_blobs(file, name, values);
+  return file.finish();
 }
 
 }  // namespace

@@ -9,13 +9,14 @@
 
 #include "loaders/crop.h"
 #include "loaders/encode.h"
+#include "loaders/stored_crop.h"
 #include "manifests/atomic_file.h"
 #include "pipeline/unit_steps.h"
 
 namespace q3d::pipeline {
 namespace {
 
-constexpr int kTilePx = 256;
+constexpr int kTilePx = loaders::kPatchSidePx;
 constexpr int kCaptionPx = 34;
 const cv::Scalar kAnnotated(60, 220, 60);
 const cv::Scalar kProjected(255, 60, 60);
@@ -25,16 +26,9 @@ const cv::Scalar kInk(235, 235, 235);
 // The network's crop, cut out of the stored crop.
 cv::Mat network_crop(const manifests::ShardSample& sample) {
   const cv::Mat stored = loaders::decode_stored(sample.crop, 3);
-  const double scale = kTilePx / sample.patch_box[2];
-  const std::array<double, 6>& a = sample.crop_from_image;
-  // tile <- image <- stored crop; both maps only scale and shift.
-  const double sx = scale / a[0];
-  const double sy = scale / a[4];
-  const double tx = kTilePx / 2.0 - scale * sample.patch_box[0] - sx * a[2];
-  const double ty = kTilePx / 2.0 - scale * sample.patch_box[1] - sy * a[5];
-  cv::Mat tile;
-  cv::warpAffine(stored, tile, cv::Matx23d(sx, 0, tx, 0, sy, ty), {kTilePx, kTilePx}, cv::INTER_AREA);
-  return tile;
+  const auto& [center_x, center_y, side] = sample.patch_box;
+  const loaders::Affine from_image = loaders::patch_from_image({center_x, center_y, side}, kTilePx);
+  return loaders::warp_patch(stored, {}, loaders::patch_from_stored_crop(from_image, sample.crop_from_image)).rgb;
 }
 
 cv::Point to_tile(float x, float y) {

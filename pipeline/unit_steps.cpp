@@ -10,6 +10,7 @@
 #include "loaders/crop.h"
 #include "loaders/encode.h"
 #include "loaders/image.h"
+#include "loaders/stored_crop.h"
 #include "pipeline/interrupt.h"
 
 namespace q3d::pipeline {
@@ -37,7 +38,7 @@ void store_crop(DecodedSample& sample, const cv::Mat& rgb, const cv::Mat& mask, 
                 const ShardConfig& shards) {
   const loaders::StoredCrop crop =
       loaders::make_stored_crop(rgb, mask, box, shards.crop_scale, shards.crop_min_side_px);
-  sample.stored_side_px = crop.side_px;
+  sample.stored_side_px = crop.rgb.cols;
   sample.stored_from_image = crop.from_image;
   if (shards.images == "reference") return;
   sample.stored_crop = shards.images == "png" ? loaders::encode_png(crop.rgb)

@@ -48,7 +48,9 @@ class HostileTable : public ::testing::Test {
     const hid_t space = H5Screate_simple(static_cast<int>(extents.size()), extents.data(), nullptr);
     const hid_t set = H5Dcreate2(file, name, type, space, H5P_DEFAULT, creation, H5P_DEFAULT);
     ASSERT_GE(set, 0) << name;
-    if (data != nullptr) ASSERT_GE(H5Dwrite(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data), 0);
+    if (data != nullptr) {
+      ASSERT_GE(H5Dwrite(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data), 0);
+    }
     H5Dclose(set);
     H5Sclose(space);
   }
@@ -92,11 +94,11 @@ TEST_F(HostileTable, AbsurdExtents) {
 TEST_F(HostileTable, AbsurdTextWidth) {
   break_with([&](hid_t file) {
     const hid_t type = H5Tcopy(H5T_C_S1);
-    H5Tset_size(type, std::size_t{1} << 40);
+    H5Tset_size(type, std::size_t{1} << 30);
     add(file, "wide", type, {2});
     H5Tclose(type);
   });
-  expect_refused("wide: entries of 1099511627776 bytes");
+  expect_refused("wide: entries of 1073741824 bytes");
 }
 
 TEST_F(HostileTable, RowsThatDisagree) {
@@ -106,14 +108,14 @@ TEST_F(HostileTable, RowsThatDisagree) {
 }
 
 TEST_F(HostileTable, OffsetsThatDoNotAscendOrDoNotFit) {
-  for (const std::vector<std::int64_t> offsets :
-       {std::vector<std::int64_t>{0, 9, 7}, {0, -5, 12}, {1, 5, 12}, {0, 5, 13}, {0, 5, 11}}) {
+  const std::vector<std::vector<std::int64_t>> bad{
+      {0, 9, 7}, {0, -5, 12}, {0, 13, 12}, {1, 5, 12}, {0, 5, 13}};
+  for (const auto& offsets : bad) {
     break_with([&](hid_t file) {
       const hid_t set = H5Dopen2(file, "picture_offsets", H5P_DEFAULT);
       H5Dwrite(set, H5T_STD_I64LE, H5S_ALL, H5S_ALL, H5P_DEFAULT, offsets.data());
       H5Dclose(set);
     });
-    if (offsets == std::vector<std::int64_t>{0, 5, 12}) continue;
     expect_refused("picture_offsets: must ascend from 0 to 12");
   }
 }
@@ -179,7 +181,7 @@ TEST_F(HostileTable, RandomFlipsNeverCrash) {
     for (int flips = 0; flips < 1 + trial % 3; ++flips) {
       bad[random() % bad.size()] ^= static_cast<char>(1 << (random() % 8));
     }
-    std::ofstream(path_, std::ios::binary) << bad;
+    std::ofstream(path_, std::ios::binary | std::ios::in) << bad;  // same size: written in place
     try {
       const Table table = read_table(path_);
       EXPECT_EQ(table.rows, 2);

@@ -1,0 +1,120 @@
+#include "filters/fidelity.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace q3d::filters {
+namespace {
+
+using manifests::Judgement;
+using manifests::Reason;
+using manifests::Verdict;
+
+void require(bool holds, std::string_view rule, double got) {
+  if (!holds) throw std::invalid_argument(fmt::format("thresholds: {} must hold, got {}", rule, got));
+}
+
+Judgement not_finite(std::string_view detail) {
+  Judgement judgement;
+  judgement.verdict = Verdict::failed;
+  judgement.reason = Reason::prediction_not_finite;
+  judgement.detail = detail;
+  return judgement;
+}
+
+// The first of the least finite values; curve[0] is finite.
+std::size_t best_iterate(std::span<const double> curve) {
+  std::size_t best = 0;
+  for (std::size_t i = 1; i < curve.size(); ++i) {
+    if (std::isfinite(curve[i]) && curve[i] < curve[best]) best = i;
+  }
+  return best;
+}
+
+// NaN when no iterate of the window was measured.
+double gain_within(std::span<const double> curve, int window) {
+  double least = std::numeric_limits<double>::infinity();
+  const std::size_t end = std::min(curve.size(), static_cast<std::size_t>(window) + 1);
+  for (std::size_t i = 1; i < end; ++i) {
+    if (std::isfinite(curve[i])) least = std::min(least, curve[i]);
+  }
+  if (std::isinf(least)) return std::numeric_limits<double>::quiet_NaN();
+  return curve[0] > 0 ? (curve[0] - least) / curve[0] : 0.0;
+}
+
+}  // namespace
+
+void check(const Thresholds& t) {
+  require(t.tau_low > 0, "0 < tau_low", t.tau_low);
+  require(t.tau_low <= t.tau_high, "tau_low <= tau_high", t.tau_high);
+  require(t.delta >= 0 && t.delta < 1, "0 <= delta < 1", t.delta);
+  require(t.gain_window >= 1, "gain_window >= 1", t.gain_window);
+  require(t.iterations_min >= 1, "iterations_min >= 1", t.iterations_min);
+  require(t.iterations_min <= t.iterations_max, "iterations_min <= iterations_max", t.iterations_max);
+}
+
+Band band(double initial_error, const Thresholds& thresholds) {
+  if (initial_error < thresholds.tau_low) return Band::retain;
+  if (initial_error < thresholds.tau_high) return Band::refine;
+  return Band::discard;
+}
+
+int adaptation_iterations(double initial_error, const Thresholds& thresholds) {
+  if (band(initial_error, thresholds) != Band::refine) {
+    throw std::invalid_argument(fmt::format("L_proj {} lies outside the middle band [{}, {})", initial_error,
+                                            thresholds.tau_low, thresholds.tau_high));
+  }
+  const double position = (initial_error - thresholds.tau_low) / (thresholds.tau_high - thresholds.tau_low);
+  const int range = thresholds.iterations_max - thresholds.iterations_min;
+  return static_cast<int>(std::lround(thresholds.iterations_min + range * position));
+}
+
+Judgement judge_initial(double initial_error, const Thresholds& thresholds) {
+  if (!std::isfinite(initial_error)) return not_finite("L_proj of the prediction is not finite");
+  Judgement judgement;
+  judgement.initial_error = initial_error;
+  judgement.final_error = initial_error;
+  switch (band(initial_error, thresholds)) {
+    case Band::retain:
+      judgement.verdict = Verdict::retained;
+      break;
+    case Band::refine:
+      judgement.verdict = Verdict::discarded;
+      judgement.reason = Reason::gain_too_small;
+      judgement.detail =
+          fmt::format("L_proj {:.4g} lies in the middle band and was not adapted", initial_error);
+      break;
+    case Band::discard:
+      judgement.verdict = Verdict::discarded;
+      judgement.reason = Reason::error_too_large;
+      judgement.detail = fmt::format("L_proj {:.4g}, tau_high {:.4g}", initial_error, thresholds.tau_high);
+      break;
+  }
+  return judgement;
+}
+
+Judgement judge_adapted(std::span<const double> curve, const Thresholds& thresholds) {
+  if (curve.empty()) return not_finite("no iterate was measured");
+  if (!std::isfinite(curve[0])) return not_finite("L_proj of the prediction is not finite");
+  const std::size_t best = best_iterate(curve);
+  Judgement judgement;
+  judgement.initial_error = curve[0];
+  judgement.final_error = curve[best];
+  judgement.gain = gain_within(curve, thresholds.gain_window);
+  judgement.iterations = static_cast<int>(curve.size()) - 1;
+  judgement.best_iteration = static_cast<int>(best);
+  if (curve[best] < thresholds.tau_low || judgement.gain >= thresholds.delta) {
+    judgement.verdict = Verdict::refined;
+    return judgement;
+  }
+  judgement.verdict = Verdict::discarded;
+  judgement.reason = Reason::gain_too_small;
+  judgement.detail = fmt::format("gain {:.4g} within {} iterations, delta {:.4g}", judgement.gain,
+                                 thresholds.gain_window, thresholds.delta);
+  return judgement;
+}
+
+}  // namespace q3d::filters

@@ -1,0 +1,97 @@
+// HDF5's in-memory driver, with memory functions of our own that keep the image when the file closes. The
+// library's H5Fget_file_image would be shorter, but that of 1.10 clears a flag of the superblock without
+// renewing its checksum, and no reader accepts the result.
+#include "manifests/hdf5_memory_file.h"
+
+#include <fmt/format.h>
+
+#include <bit>
+#include <cstdint>
+#include <cstdlib>
+#include <cstring>
+#include <stdexcept>
+
+namespace q3d::manifests::hdf5 {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "tables are written from little-endian memory");
+
+constexpr std::size_t kGrowthBytes = 1 << 20;
+constexpr std::size_t kEndOfFileField = 28;  // HDF5 file format, superblock version 2 "End of File Address"
+
+}  // namespace
+
+MemoryFile::Memory::~Memory() {
+  std::free(bytes);
+}
+
+H5FD_file_image_callbacks_t MemoryFile::callbacks(Memory* memory) {
+  H5FD_file_image_callbacks_t calls{};
+  calls.image_malloc = [](std::size_t size, H5FD_file_image_op_t, void*) { return std::malloc(size); };
+  calls.image_memcpy = [](void* to, const void* from, std::size_t size, H5FD_file_image_op_t, void*) {
+    return std::memcpy(to, from, size);
+  };
+  calls.image_realloc = [](void* old, std::size_t size, H5FD_file_image_op_t, void* user) -> void* {
+    void* grown = std::realloc(old, size);
+    auto& kept = *static_cast<Memory*>(user);
+    if (grown != nullptr) {
+      kept.bytes = static_cast<std::byte*>(grown);
+      kept.allocated = size;
+    }
+    return grown;
+  };
+  // The image stays Memory's; it is the driver's only buffer.
+  calls.image_free = [](void*, H5FD_file_image_op_t, void*) -> herr_t { return 0; };
+  calls.udata_copy = [](void* user) { return user; };
+  calls.udata_free = [](void*) -> herr_t { return 0; };
+  calls.udata = memory;
+  return calls;
+}
+
+MemoryFile::MemoryFile() : memory_(std::make_unique<Memory>()) {
+  const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, "file access properties");
+  check(H5Pset_fapl_core(access.get(), kGrowthBytes, false), "in-memory driver");
+  H5FD_file_image_callbacks_t calls = callbacks(memory_.get());
+  check(H5Pset_file_image_callbacks(access.get(), &calls), "in-memory driver");
+  check(H5Pset_libver_bounds(access.get(), H5F_LIBVER_V18, H5F_LIBVER_V18), "library version bounds");
+  const Handle creation(H5Pcreate(H5P_FILE_CREATE), H5Pclose, "file creation properties");
+  check(H5Pset_obj_track_times(creation.get(), false), "file creation properties");
+  // HDF5 first looks whether the name exists on disk; no name below /dev/null ever does.
+  file_.emplace(H5Fcreate("/dev/null/table", H5F_ACC_TRUNC, creation.get(), access.get()), H5Fclose,
+                "in-memory file");
+}
+
+void MemoryFile::attribute(const std::string& name, hid_t type, const void* value) {
+  const Handle space(H5Screate(H5S_SCALAR), H5Sclose, name);
+  const Handle attribute(H5Acreate2(file_->get(), name.c_str(), type, space.get(), H5P_DEFAULT, H5P_DEFAULT),
+                         H5Aclose, name);
+  check(H5Awrite(attribute.get(), type, value), name);
+}
+
+void MemoryFile::dataset(const std::string& name, hid_t type, const std::vector<hsize_t>& extents,
+                         const void* data) {
+  const Handle space(H5Screate_simple(static_cast<int>(extents.size()), extents.data(), nullptr), H5Sclose,
+                     name);
+  const Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose, name);
+  check(H5Pset_layout(creation.get(), H5D_CONTIGUOUS), name);
+  check(H5Pset_obj_track_times(creation.get(), false), name);
+  const Handle dataset(
+      H5Dcreate2(file_->get(), name.c_str(), type, space.get(), H5P_DEFAULT, creation.get(), H5P_DEFAULT),
+      H5Dclose, name);
+  check(H5Dwrite(dataset.get(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data), name);
+}
+
+std::vector<std::byte> MemoryFile::finish() {
+  file_->close("in-memory file");
+  std::uint64_t end_of_file = 0;
+  if (memory_->allocated >= kEndOfFileField + sizeof(end_of_file)) {
+    std::memcpy(&end_of_file, memory_->bytes + kEndOfFileField, sizeof(end_of_file));
+  }
+  if (end_of_file == 0 || end_of_file > memory_->allocated) {
+    throw std::runtime_error(fmt::format("the HDF5 library left a file of {} bytes in memory for {}",
+                                         end_of_file, memory_->allocated));
+  }
+  return {memory_->bytes, memory_->bytes + end_of_file};
+}
+
+}  // namespace q3d::manifests::hdf5

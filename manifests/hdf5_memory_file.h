@@ -1,0 +1,39 @@
+// An HDF5 file that lives in memory until it is complete.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "manifests/hdf5.h"
+
+namespace q3d::manifests::hdf5 {
+
+// Use it while a Session lives. Equal calls give equal bytes: no times, fixed library-version bounds. All
+// members throw std::runtime_error naming the attribute or dataset.
+class MemoryFile {
+ public:
+  MemoryFile();
+
+  // A scalar attribute of the root group.
+  void attribute(const std::string& name, hid_t type, const void* value);
+  // A contiguous dataset, complete.
+  void dataset(const std::string& name, hid_t type, const std::vector<hsize_t>& extents, const void* data);
+  // Closes the file and returns its bytes. Call once, at the end.
+  std::vector<std::byte> finish();
+
+ private:
+  struct Memory {
+    std::byte* bytes = nullptr;
+    std::size_t allocated = 0;
+    ~Memory();
+  };
+  static H5FD_file_image_callbacks_t callbacks(Memory* memory);
+
+  std::unique_ptr<Memory> memory_;
+  std::optional<Handle> file_;
+};
+
+}  // namespace q3d::manifests::hdf5

@@ -1,0 +1,45 @@
+// Schema 1, column by column: the one place that the shard's writer, reader, self-description and document
+// agree with.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "manifests/shard.h"
+#include "manifests/table.h"
+
+namespace q3d::manifests {
+
+struct NumberColumn {
+  ElementType type;
+  std::vector<std::int64_t> row_shape;
+  // Copy one row from and to the sample; `load` may throw std::runtime_error.
+  std::function<void(const ShardSample&, std::byte* row)> store;
+  std::function<void(ShardSample&, const std::byte* row)> load;
+};
+struct TextColumn {
+  std::function<std::string(const ShardSample&)> store;
+  std::function<void(ShardSample&, std::string)> load;  // may throw std::invalid_argument
+};
+struct BytesColumn {
+  std::vector<std::byte> ShardSample::*member;
+};
+
+struct ShardColumn {
+  std::string name;
+  std::string units;  // empty: none
+  std::string meaning;
+  std::variant<NumberColumn, TextColumn, BytesColumn> content;
+};
+
+// In the order of the document. Loading follows it: truth_present comes before what depends on it.
+const std::vector<ShardColumn>& shard_columns();
+
+std::string dtype_of(const ShardColumn& column);  // "float32", ..., "text", "bytes"
+std::string shape_of(const ShardColumn& column);  // "(rows, 26, 2)"
+
+}  // namespace q3d::manifests

@@ -1,0 +1,259 @@
+#include "manifests/table_layout.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <optional>
+#include <stdexcept>
+
+#include "manifests/hdf5.h"
+
+namespace q3d::manifests {
+namespace {
+
+using hdf5::check;
+using hdf5::Handle;
+
+constexpr std::string_view kOffsetsSuffix = "_offsets";
+
+[[noreturn]] void refuse(const std::string& name, const std::string& why) {
+  throw std::runtime_error(fmt::format("{}: {}", name, why));
+}
+
+// One dataset as it lies in the file, checked to lie inside it.
+struct Layout {
+  std::optional<ElementType> type;  // empty: text
+  std::vector<std::int64_t> extents;
+  std::int64_t element_bytes = 0;
+  std::int64_t bytes = 0;
+  std::uint64_t file_offset = 0;
+};
+
+std::optional<ElementType> numeric_type(hid_t type) {
+  const std::array<std::pair<hid_t, ElementType>, 6> known{{{H5T_IEEE_F32LE, ElementType::float32},
+                                                            {H5T_IEEE_F64LE, ElementType::float64},
+                                                            {H5T_STD_I8LE, ElementType::int8},
+                                                            {H5T_STD_U8LE, ElementType::uint8},
+                                                            {H5T_STD_I32LE, ElementType::int32},
+                                                            {H5T_STD_I64LE, ElementType::int64}}};
+  for (const auto& [stored, element] : known) {
+    if (check(H5Tequal(type, stored), "compare types") > 0) return element;
+  }
+  return std::nullopt;
+}
+
+bool is_fixed_text(hid_t type) {
+  return H5Tget_class(type) == H5T_STRING && H5Tis_variable_str(type) == 0;
+}
+
+void read_extents(const std::string& name, hid_t dataset, Layout& layout) {
+  const Handle space(H5Dget_space(dataset), H5Sclose, name);
+  const int rank = check(H5Sget_simple_extent_ndims(space.get()), name);
+  if (rank < 1) refuse(name, "got a scalar, expected one entry a row");
+  std::vector<hsize_t> extents(static_cast<std::size_t>(rank));
+  check(H5Sget_simple_extent_dims(space.get(), extents.data(), nullptr), name);
+  layout.bytes = layout.element_bytes;
+  for (std::size_t axis = 0; axis < extents.size(); ++axis) {
+    std::int64_t extent = 0;
+    if (__builtin_add_overflow(extents[axis], hsize_t{0}, &extent) ||
+        __builtin_mul_overflow(layout.bytes, extent, &layout.bytes)) {
+      refuse(name, fmt::format("its extents overflow (axis {} has {})", axis, extents[axis]));
+    }
+    if (axis > 0 && extent == 0) refuse(name, fmt::format("axis {} is empty", axis));
+    layout.extents.push_back(extent);
+  }
+}
+
+Layout read_layout(const std::string& name, hid_t file, std::uint64_t file_bytes) {
+  H5L_info_t link{};
+  check(H5Lget_info(file, name.c_str(), &link, H5P_DEFAULT), name);
+  H5O_info_t object{};
+  if (link.type != H5L_TYPE_HARD) refuse(name, "is a link to elsewhere; a table holds plain datasets");
+  check(H5Oget_info_by_name(file, name.c_str(), &object, H5P_DEFAULT), name);
+  if (object.type != H5O_TYPE_DATASET) refuse(name, "is no dataset; a table holds plain datasets");
+
+  const Handle dataset(H5Dopen2(file, name.c_str(), H5P_DEFAULT), H5Dclose, name);
+  const Handle creation(H5Dget_create_plist(dataset.get()), H5Pclose, name);
+  if (H5Pget_layout(creation.get()) != H5D_CONTIGUOUS || H5Pget_external_count(creation.get()) != 0) {
+    refuse(name, "is not stored contiguously in this file");
+  }
+  const Handle type(H5Dget_type(dataset.get()), H5Tclose, name);
+  Layout layout;
+  layout.type = numeric_type(type.get());
+  if (!layout.type && !is_fixed_text(type.get())) {
+    refuse(name, "is neither of the six number types nor fixed-width text");
+  }
+  const std::size_t element_bytes = H5Tget_size(type.get());
+  if (element_bytes == 0 || element_bytes > file_bytes) {
+    refuse(name, fmt::format("entries of {} bytes in a file of {}", element_bytes, file_bytes));
+  }
+  layout.element_bytes = static_cast<std::int64_t>(element_bytes);
+  read_extents(name, dataset.get(), layout);
+  if (layout.bytes == 0) return layout;
+  layout.file_offset = H5Dget_offset(dataset.get());
+  if (layout.file_offset > file_bytes ||
+      static_cast<std::uint64_t>(layout.bytes) > file_bytes - layout.file_offset) {
+    refuse(name, fmt::format("claims {} bytes, but the file has {}", layout.bytes, file_bytes));
+  }
+  return layout;
+}
+
+std::vector<std::string> link_names(hid_t file) {
+  H5G_info_t group{};
+  check(H5Gget_info(file, &group), "root group");
+  std::vector<std::string> names;
+  for (hsize_t i = 0; i < group.nlinks; ++i) {
+    const auto name_at = [&](char* out, std::size_t size) {
+      return check(H5Lget_name_by_idx(file, ".", H5_INDEX_NAME, H5_ITER_INC, i, out, size, H5P_DEFAULT),
+                   "dataset names");
+    };
+    std::string name(static_cast<std::size_t>(name_at(nullptr, 0)), '\0');
+    name_at(name.data(), name.size() + 1);
+    names.push_back(std::move(name));
+  }
+  return names;
+}
+
+std::int64_t read_rows(hid_t file) {
+  if (check(H5Aexists(file, "rows"), "rows") == 0) {
+    refuse("rows", "the attribute is absent, so this HDF5 file is not one of this program's tables");
+  }
+  const Handle attribute(H5Aopen(file, "rows", H5P_DEFAULT), H5Aclose, "rows");
+  const Handle type(H5Aget_type(attribute.get()), H5Tclose, "rows");
+  const Handle space(H5Aget_space(attribute.get()), H5Sclose, "rows");
+  if (H5Tequal(type.get(), H5T_STD_I64LE) <= 0 || H5Sget_simple_extent_npoints(space.get()) != 1) {
+    refuse("rows", "expected one int64");
+  }
+  std::int64_t rows = 0;
+  check(H5Aread(attribute.get(), H5T_STD_I64LE, &rows), "rows");
+  if (rows < 0) refuse("rows", fmt::format("got {}", rows));
+  return rows;
+}
+
+// Attributes of other types are passed over: who wants one of them will miss it.
+std::map<std::string, std::string> read_attributes(hid_t file, std::uint64_t file_bytes) {
+  H5O_info_t root{};
+  check(H5Oget_info(file, &root), "root group");
+  std::map<std::string, std::string> attributes;
+  for (hsize_t i = 0; i < root.num_attrs; ++i) {
+    const Handle attribute(H5Aopen_by_idx(file, ".", H5_INDEX_NAME, H5_ITER_INC, i, H5P_DEFAULT, H5P_DEFAULT),
+                           H5Aclose, "attributes");
+    std::string name(static_cast<std::size_t>(check(H5Aget_name(attribute.get(), 0, nullptr), "attributes")),
+                     '\0');
+    check(H5Aget_name(attribute.get(), name.size() + 1, name.data()), "attributes");
+    const Handle type(H5Aget_type(attribute.get()), H5Tclose, name);
+    const Handle space(H5Aget_space(attribute.get()), H5Sclose, name);
+    const std::size_t width = H5Tget_size(type.get());
+    const bool one_text = is_fixed_text(type.get()) && H5Sget_simple_extent_npoints(space.get()) == 1;
+    if (!one_text || width > file_bytes) continue;
+    std::string value(width, '\0');
+    check(H5Aread(attribute.get(), type.get(), value.data()), name);
+    value.resize(std::min(value.find('\0'), value.size()));
+    attributes.emplace(std::move(name), std::move(value));
+  }
+  return attributes;
+}
+
+std::vector<std::int64_t> read_offsets(const FileDescriptor& file, const std::string& name, std::int64_t rows,
+                                       const Layout& offsets, std::int64_t flat_bytes) {
+  if (offsets.type != ElementType::int64 || offsets.extents != std::vector<std::int64_t>{rows + 1}) {
+    refuse(name + "_offsets", fmt::format("expected int64 ({})", rows + 1));
+  }
+  std::vector<std::int64_t> values(static_cast<std::size_t>(rows) + 1);
+  file.read_at(offsets.file_offset, std::as_writable_bytes(std::span(values)));
+  if (values.front() != 0 || values.back() != flat_bytes || !std::is_sorted(values.begin(), values.end())) {
+    refuse(name + "_offsets", fmt::format("must ascend from 0 to {}, the bytes of {}", flat_bytes, name));
+  }
+  return values;
+}
+
+TableReader::Column make_column(const std::string& name, std::int64_t rows, const Layout& layout) {
+  if (layout.extents[0] != rows)
+    refuse(name, fmt::format("got {} rows, expected {}", layout.extents[0], rows));
+  TableReader::Column column;
+  column.file_offset = layout.file_offset;
+  column.row_bytes = layout.element_bytes;
+  if (layout.type) {
+    column.type = *layout.type;
+    column.row_shape.assign(layout.extents.begin() + 1, layout.extents.end());
+    column.row_bytes *= elements_per_row(column.row_shape);
+  } else {
+    column.kind = TableReader::Kind::text;
+    if (layout.extents.size() != 1) refuse(name, "text must have one axis");
+  }
+  return column;
+}
+
+std::map<std::string, TableReader::Column> read_columns(hid_t hdf5_file, const FileDescriptor& file,
+                                                        std::int64_t rows) {
+  const std::uint64_t file_bytes = file.size();
+  std::map<std::string, Layout> layouts;
+  std::uint64_t total = 0;
+  for (const std::string& name : link_names(hdf5_file)) {
+    const Layout& layout = layouts[name] = read_layout(name, hdf5_file, file_bytes);
+    total += static_cast<std::uint64_t>(layout.bytes);
+    // Datasets that share bytes could claim the file's size many times over.
+    if (total > file_bytes) refuse(name, "the datasets together claim more bytes than the file has");
+  }
+  std::map<std::string, TableReader::Column> columns;
+  for (const auto& [name, layout] : layouts) {
+    if (name.ends_with(kOffsetsSuffix)) {
+      const std::string flat = name.substr(0, name.size() - kOffsetsSuffix.size());
+      if (!layouts.contains(flat)) refuse(name, fmt::format("its bytes, dataset {}, are absent", flat));
+      continue;
+    }
+    const auto offsets = layouts.find(name + std::string(kOffsetsSuffix));
+    if (offsets == layouts.end()) {
+      columns.emplace(name, make_column(name, rows, layout));
+      continue;
+    }
+    if (layout.type != ElementType::uint8 || layout.extents.size() != 1) refuse(name, "expected flat uint8");
+    TableReader::Column column;
+    column.kind = TableReader::Kind::blob;
+    column.file_offset = layout.file_offset;
+    column.blob_offsets = read_offsets(file, name, rows, offsets->second, layout.bytes);
+    columns.emplace(name, std::move(column));
+  }
+  return columns;
+}
+
+Handle open_hdf5(const std::filesystem::path& path) {
+  if (H5Fis_hdf5(path.c_str()) <= 0) throw std::runtime_error("not an HDF5 file");
+  const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, "file access properties");
+  // Published shards may lie on read-only or network file systems, where HDF5's own locking fails.
+  check(H5Pset_file_locking(access.get(), false, true), "file locking");
+  return {H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.get()), H5Fclose, "cannot open"};
+}
+
+// Calls `read(HDF5 file)` and puts the path before the message of what it throws.
+template <typename Read>
+auto with_hdf5(const std::filesystem::path& path, Read read) {
+  const hdf5::Session session;
+  try {
+    const Handle file = open_hdf5(path);
+    return read(file.get());
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(fmt::format("{}: {}", path.string(), error.what()));
+  }
+}
+
+}  // namespace
+
+TableLayout read_table_layout(const FileDescriptor& file) {
+  return with_hdf5(file.path(), [&](hid_t hdf5_file) {
+    TableLayout layout;
+    layout.rows = read_rows(hdf5_file);
+    layout.attributes = read_attributes(hdf5_file, file.size());
+    layout.columns = read_columns(hdf5_file, file, layout.rows);
+    return layout;
+  });
+}
+
+std::map<std::string, std::string> read_table_attributes(const std::filesystem::path& path) {
+  const FileDescriptor file(path, O_RDONLY);
+  return with_hdf5(path, [&](hid_t hdf5_file) { return read_attributes(hdf5_file, file.size()); });
+}
+
+}  // namespace q3d::manifests

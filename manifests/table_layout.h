@@ -1,0 +1,21 @@
+// Where the columns of a table lie in its file.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+
+#include "manifests/table_reader.h"
+
+namespace q3d::manifests {
+
+struct TableLayout {
+  std::int64_t rows = 0;
+  std::map<std::string, std::string> attributes;
+  std::map<std::string, TableReader::Column> columns;
+};
+
+// Opens the file a second time, with HDF5, and checks everything that TableReader promises.
+TableLayout read_table_layout(const FileDescriptor& file);
+
+}  // namespace q3d::manifests
