@@ -64,6 +64,7 @@ enum class Reason : std::uint8_t {
   no_visible_keypoints,
   record_malformed,
   image_not_listed,
+  not_a_quadruped,  // left out by the species rule (birds, primates, ...)
   // failed while reading the picture
   image_missing,
   image_empty,

@@ -1,0 +1,94 @@
+#include "loaders/png.h"
+
+#include <fmt/format.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <array>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <string_view>
+
+namespace q3d::loaders {
+namespace {
+
+using manifests::Reason;
+
+constexpr std::array<unsigned char, 8> kSignature{0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
+constexpr std::size_t kChunkFrame = 12;  // length, type and checksum, four bytes each
+constexpr std::size_t kHeaderData = 13;  // of IHDR
+
+std::uint32_t big_endian(const unsigned char* at) {
+  return std::uint32_t{at[0]} << 24U | std::uint32_t{at[1]} << 16U | std::uint32_t{at[2]} << 8U | at[3];
+}
+
+struct Chunk {
+  std::string_view type;
+  std::span<const unsigned char> whole;  // with its frame
+  std::span<const unsigned char> data() const { return whole.subspan(8, whole.size() - kChunkFrame); }
+  bool is_intact() const {
+    const uLong sum = crc32(0, whole.data() + 4, static_cast<uInt>(whole.size() - 8));
+    return sum == big_endian(whole.data() + whole.size() - 4);
+  }
+};
+
+// The chunk at the start of `rest`; empty when the file ends before it does.
+Chunk chunk_at(std::span<const unsigned char> rest) {
+  if (rest.size() < kChunkFrame) return {};
+  const std::size_t size = big_endian(rest.data()) + kChunkFrame;
+  if (rest.size() < size) return {};
+  return {{reinterpret_cast<const char*>(rest.data()) + 4, 4}, rest.first(size)};
+}
+
+DecodedImage damaged(std::string what) {
+  return {{}, Reason::image_not_an_image, "damaged PNG: " + what};
+}
+
+DecodedImage decode_plain(const std::vector<unsigned char>& file) {
+  try {
+    cv::Mat image = cv::imdecode(file, cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
+    if (image.empty()) return damaged("its pixel data cannot be unpacked");
+    cv::cvtColor(image, image, cv::COLOR_BGR2RGB);
+    return {image, Reason::none, {}};
+  } catch (const cv::Exception& error) {
+    return damaged(error.err);
+  }
+}
+
+}  // namespace
+
+bool is_png(std::span<const std::byte> bytes) {
+  const auto* start = reinterpret_cast<const unsigned char*>(bytes.data());
+  return bytes.size() >= kSignature.size() && std::equal(kSignature.begin(), kSignature.end(), start);
+}
+
+DecodedImage decode_png(std::span<const std::byte> bytes) {
+  std::span rest(reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size());
+  rest = rest.subspan(kSignature.size());
+  std::vector<unsigned char> plain(kSignature.begin(), kSignature.end());
+  for (std::string_view type; type != "IEND";) {
+    const Chunk chunk = chunk_at(rest);
+    if (chunk.whole.empty()) return {{}, Reason::image_truncated, "the file ends inside the PNG"};
+    rest = rest.subspan(chunk.whole.size());
+    const bool is_first = type.empty();
+    type = chunk.type;
+    if (is_first != (type == "IHDR") || (is_first && chunk.data().size() != kHeaderData)) {
+      return damaged(fmt::format("got chunk {} where IHDR belongs or a second IHDR", type));
+    }
+    if (!chunk.is_intact()) return damaged(fmt::format("chunk {} fails its checksum", type));
+    if (type != "IHDR" && type != "PLTE" && type != "IDAT" && type != "IEND") continue;
+    if (is_first) {
+      const std::int64_t width = big_endian(chunk.data().data());
+      const std::int64_t height = big_endian(chunk.data().data() + 4);
+      if (width > kMaxPixels || height > kMaxPixels || width * height > kMaxPixels) {
+        return {{},
+                Reason::image_too_large,
+                fmt::format("got a PNG of {} x {} px, expected at most {} px", width, height, kMaxPixels)};
+      }
+    }
+    plain.insert(plain.end(), chunk.whole.begin(), chunk.whole.end());
+  }
+  return decode_plain(plain);
+}
+
+}  // namespace q3d::loaders
