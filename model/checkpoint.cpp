@@ -147,8 +147,11 @@ std::shared_ptr<PrimaNet> load_net(const smal::SafeTensors& file, const PrimaCon
 }
 
 void write_checkpoint(const std::filesystem::path& path, const PrimaConfig& config,
-                      const smal::NamedTensors& tensors) {
-  smal::write_safetensors(path, tensors, {{kConfigKey, to_json(config).dump()}});
+                      const smal::NamedTensors& tensors,
+                      const std::map<std::string, std::string>& more_metadata) {
+  std::map<std::string, std::string> metadata = more_metadata;
+  metadata[kConfigKey] = to_json(config).dump();
+  smal::write_safetensors(path, tensors, metadata);
 }
 
 }  // namespace q3d::model

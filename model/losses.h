@@ -6,6 +6,7 @@
 
 #include <torch/torch.h>
 
+#include "model/loss_weights.h"
 #include "model/partial_mean.h"
 #include "model/prima.h"
 #include "model/priors.h"
@@ -26,26 +27,6 @@ struct Targets {
 // Throws std::invalid_argument naming the tensor, got and expected.
 void check_targets(const Targets& targets);
 Targets to_device(const Targets& targets, torch::Device device);
-
-// The official configuration.
-struct LossWeights {
-  double keypoints_3d = 0.05;
-  double keypoints_2d = 0.01;
-  double aux_keypoints_2d = 0.001;
-  double aux_keypoints_3d = 0.001;
-  double global_orient = 0.005;
-  double pose = 0.001;
-  double betas = 0.0005;
-  double contrastive = 0.0005;
-  double adversarial = 0.0005;  // used in the warm-up only
-
-  bool operator==(const LossWeights&) const = default;
-};
-
-// `official` repeats the released code to the bit of its gradients, which are NaN where a predicted joint is
-// not rotated at all, and lets samples without truth pose as real animals for the discriminator. `sound` has
-// neither.
-enum class LossVariant { sound, official };
 
 // Scalars on the prediction's device, with their graphs.
 struct LossTerms {

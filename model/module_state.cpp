@@ -50,7 +50,7 @@ void restore_parameters(const smal::SafeTensors& file, const std::string& prefix
 
 void append_generators(smal::NamedTensors& state, const std::string& prefix, torch::Device device) {
   for (const auto& [name, where] : generators(device)) {
-    const at::Generator generator = at::globalContext().defaultGenerator(where);
+    at::Generator generator = at::globalContext().defaultGenerator(where);
     const std::lock_guard lock(generator.mutex());
     state.emplace_back(prefix + name, generator.get_state().clone());
   }

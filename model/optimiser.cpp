@@ -22,13 +22,6 @@ AdamW::AdamW(std::vector<ParameterGroup> groups, const AdamWOptions& options) : 
                             torch::zeros({}, parameter.options().dtype(torch::kFloat32))});
     }
   }
-  for (Group& group : groups_) {
-    for (Slot& slot : group.slots) {
-      slot.first_moment.set_requires_grad(false);
-      slot.second_moment.set_requires_grad(false);
-      slot.steps.set_requires_grad(false);
-    }
-  }
 }
 
 void AdamW::zero_grad() {
@@ -50,7 +43,7 @@ void AdamW::step(double learning_rate) {
       steps.push_back(slot.steps);
     }
     if (parameters.empty()) continue;
-    for (torch::Tensor& count : steps) count.add_(1.0);  // the fused kernel reads the count and leaves it
+    at::_foreach_add_(steps, 1.0);  // the fused kernel reads the counts and leaves them
     at::_fused_adamw_(parameters, gradients, first, second, /*max_exp_avg_sqs=*/{}, steps,
                       learning_rate * group.rate_scale, options_.beta1, options_.beta2, options_.weight_decay,
                       options_.epsilon, /*amsgrad=*/false, /*maximize=*/false);

@@ -220,7 +220,7 @@ TEST_P(LossesParity, ThreeOptimiserSteps) {
     ++compared;
     const std::string key = name.substr(thinned ? 9 : 7);
     const auto thin = [&](const torch::Tensor& tensor) {
-      return thinned ? tensor.flatten().slice(0, 0, torch::indexing::None, 7) : tensor.flatten();
+      return thinned ? tensor.flatten().slice(0, 0, std::nullopt, 7) : tensor.flatten();
     };
     const torch::Tensor kept = thin(is_noise(key, parameter(key))).logical_not();
     const torch::Tensor expected = file_.tensor(name).flatten();
