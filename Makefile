@@ -5,20 +5,27 @@ OUT    ?= out
 CONFIG ?=
 JOBS   ?= $(shell nproc)
 
-.PHONY: quadruped3d test build setup configure sample format bench asan clean help
+.PHONY: quadruped3d test program build setup assets format bench asan clean help
 
-quadruped3d: build  ## build the dataset that CONFIG describes (default: the rendered sample world)
+quadruped3d: program  ## build the dataset that CONFIG describes (default: the rendered sample world)
 	tools/quadruped3d.sh $(OUT) $(CONFIG)
 
 test: build  ## build everything and run all tests
 	ctest --test-dir $(BUILD) --output-on-failure
 
-build: $(BUILD)/build.ninja  ## compile (release unless PRESET says otherwise)
+program: $(BUILD)/build.ninja  ## compile the program alone (release unless PRESET says otherwise)
+	@cmake --build $(BUILD) --parallel $(JOBS) --target quadruped3d
+	@ln -sfn $(PRESET)/pipeline/quadruped3d build/quadruped3d
+
+build: $(BUILD)/build.ninja  ## compile everything, tests too
 	@cmake --build $(BUILD) --parallel $(JOBS)
 	@ln -sfn $(PRESET)/pipeline/quadruped3d build/quadruped3d
 
 setup:  ## install Debian packages and LibTorch where they are missing
 	@tools/setup.sh
+
+assets: setup  ## fetch the official weights and body where there is a network, verify and import them
+	@.venv/bin/python tools/import_assets.py fetch
 
 $(BUILD)/build.ninja: | setup
 	cmake --preset $(PRESET) $(CMAKE_ARGS)

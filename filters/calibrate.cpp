@@ -70,21 +70,24 @@ Calibration calibrate(std::span<const CalibrationSample> pool, const TargetShare
       return std::abs(yield(a) - wanted) < std::abs(yield(b) - wanted);
     });
   };
+  const double retained_target = shares.retained * count;
+  const double refined_target = shares.refined * count;
   const std::size_t low =
-      closest(0, shares.retained * count, [](std::size_t cut) { return static_cast<double>(cut); });
+      closest(0, retained_target, [](std::size_t cut) { return static_cast<double>(cut); });
   const auto refined_at = [&](std::size_t cut) { return passing[cut] - passing[low]; };
-  const std::size_t high = closest(low, shares.refined * count, refined_at);
+  const std::size_t high = closest(low, refined_target, refined_at);
+  const auto retained = static_cast<double>(low);
+  const double refined = refined_at(high);
 
   Calibration result;
   result.thresholds = base;
   result.thresholds.tau_low = threshold_at(sorted, low);
   result.thresholds.tau_high = threshold_at(sorted, high);
   check(result.thresholds);
-  result.retained = static_cast<double>(low) / count;
-  result.refined = refined_at(high) / count;
-  result.discarded = 1.0 - result.retained - result.refined;
-  result.reached = std::abs(result.retained - shares.retained) * count <= 1.0 &&
-                   std::abs(result.refined - shares.refined) * count <= 1.0;
+  result.retained = retained / count;
+  result.refined = refined / count;
+  result.discarded = (count - retained - refined) / count;
+  result.reached = std::abs(retained - retained_target) <= 1.0 && std::abs(refined - refined_target) <= 1.0;
   return result;
 }
 

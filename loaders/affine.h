@@ -12,7 +12,7 @@ struct Point {
   double y = 0.0;
 };
 
-Point apply(const Affine& affine, Point point);
+Point map_point(const Affine& affine, Point point);
 
 // `second` after `first`.
 Affine compose(const Affine& second, const Affine& first);

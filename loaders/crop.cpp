@@ -139,7 +139,7 @@ std::array<float, manifests::kNumKeypoints * 3> keypoints_to_crop(const manifest
   for (std::size_t i = 0; i < keypoints.size(); ++i) {
     // The official code holds annotated pixels in float32 before it applies the affine map in double.
     const Point image_px{static_cast<float>(keypoints[i].x_px), static_cast<float>(keypoints[i].y_px)};
-    const Point patch_px = apply(patch_from_image, image_px);
+    const Point patch_px = map_point(patch_from_image, image_px);
     crop[3 * i] = static_cast<float>(patch_px.x) / kSide - 0.5F;
     crop[3 * i + 1] = static_cast<float>(patch_px.y) / kSide - 0.5F;
     crop[3 * i + 2] = keypoints[i].weight;

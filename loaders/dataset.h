@@ -1,7 +1,6 @@
 // Annotation files -> sample records.
 #pragma once
 
-#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -16,19 +15,28 @@ struct DatasetOptions {
   std::string split;           // second part of every sample id
   std::filesystem::path root;  // pictures and masks are looked up below this folder, and never outside it
   std::filesystem::path annotations;  // JSON file; relative to root unless absolute
-  std::filesystem::path images;       // SuperAnimal, Animal Kingdom: folder of the pictures, relative to root
+  // Folder of the pictures, relative to root unless absolute; naming one outside the root allows it. Empty is
+  // the format's own: root (prima), root/images (superanimal), root/dataset (animal_kingdom), or root where
+  // that folder does not exist.
+  std::filesystem::path images;
 };
 
 struct Dataset {
-  std::vector<manifests::SampleRecord>
-      records;                     // file order; records that cannot be used carry their failure
-  std::vector<std::string> notes;  // what a user should know (boxes read as xyxy, ...)
+  std::vector<manifests::SampleRecord> records;  // file order; what cannot be used carries its failure
+  std::vector<std::string> notes;                // what a user should know (boxes read as xyxy, ...)
 };
 
-std::vector<std::string> dataset_formats();  // "prima", "superanimal", "animal_kingdom"
+// "prima": the JSON of PRIMA and AniMer (Animal3D, CtrlAni3D and sets converted to it).
+// "superanimal": SuperAnimal-Quadruped's 39-keypoint COCO. "animal_kingdom": its 23-keypoint list of records,
+// or its COCO file, told apart by content.
+std::vector<std::string> dataset_formats();
 
-// Throws std::runtime_error naming file, record, field, got and expected when the file as a whole cannot be
-// read (cut short, wrong top-level type); a bad record is returned with its failure instead.
+// Sample ids are name/split/picture#annotation; the annotation is its id where the file gives distinct ones,
+// else its index.
+//
+// Throws std::invalid_argument for options that make no sense, and std::runtime_error naming file, place, got
+// and expected when the file as a whole cannot be read (absent, cut short, wrong top-level type, keypoint
+// names of another dataset). A bad record is returned with its failure instead.
 Dataset load_dataset(const DatasetOptions& options);
 
 }  // namespace q3d::loaders

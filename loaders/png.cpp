@@ -8,6 +8,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <string_view>
+#include <utility>
 
 namespace q3d::loaders {
 namespace {
@@ -16,7 +17,10 @@ using manifests::Reason;
 
 constexpr std::array<unsigned char, 8> kSignature{0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
 constexpr std::size_t kChunkFrame = 12;  // length, type and checksum, four bytes each
-constexpr std::size_t kHeaderData = 13;  // of IHDR
+// IHDR: width, height, bit depth, colour type, three methods.
+constexpr std::size_t kHeaderBytes = 13;
+constexpr std::size_t kColourTypeAt = 9;
+constexpr unsigned char kPaletteColourType = 3;
 
 std::uint32_t big_endian(const unsigned char* at) {
   return std::uint32_t{at[0]} << 24U | std::uint32_t{at[1]} << 16U | std::uint32_t{at[2]} << 8U | at[3];
@@ -44,6 +48,42 @@ DecodedImage damaged(std::string what) {
   return {{}, Reason::image_not_an_image, "damaged PNG: " + what};
 }
 
+// The chunks that make the pixels, so far.
+struct PixelChunks {
+  std::vector<unsigned char> file{kSignature.begin(), kSignature.end()};
+  bool has_header = false;
+  bool is_palette = false;
+  bool has_palette = false;
+  bool has_pixels = false;
+};
+
+// Takes a chunk in; says what is wrong with it, or "". libpng would say it too, but on stderr.
+std::string add_chunk(const Chunk& chunk, PixelChunks& pixels) {
+  const bool is_header = chunk.type == "IHDR";
+  const bool is_word =
+      std::all_of(chunk.type.begin(), chunk.type.end(), [](unsigned char c) { return c > 0x20 && c < 0x7f; });
+  const std::string name = fmt::format("chunk {}", is_word ? chunk.type : "of no name");
+  if (is_header == pixels.has_header)
+    return is_header ? "a second header" : name + " where the header belongs";
+  if (!chunk.is_intact()) return name + " fails its checksum";
+  if (is_header) {
+    if (chunk.data().size() != kHeaderBytes) return "a header of a wrong size";
+    pixels.has_header = true;
+    pixels.is_palette = chunk.data()[kColourTypeAt] == kPaletteColourType;
+  } else if (chunk.type == "PLTE") {
+    pixels.has_palette = true;
+  } else if (chunk.type == "IDAT") {
+    if (pixels.is_palette && !pixels.has_palette) return "no palette before the pixels";
+    pixels.has_pixels = true;
+  } else if (chunk.type == "IEND") {
+    if (!pixels.has_pixels) return "no pixels";
+  } else {
+    return {};  // colour profile, EXIF, text: not taken
+  }
+  pixels.file.insert(pixels.file.end(), chunk.whole.begin(), chunk.whole.end());
+  return {};
+}
+
 DecodedImage decode_plain(const std::vector<unsigned char>& file) {
   try {
     cv::Mat image = cv::imdecode(file, cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
@@ -65,30 +105,24 @@ bool is_png(std::span<const std::byte> bytes) {
 DecodedImage decode_png(std::span<const std::byte> bytes) {
   std::span rest(reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size());
   rest = rest.subspan(kSignature.size());
-  std::vector<unsigned char> plain(kSignature.begin(), kSignature.end());
+  PixelChunks pixels;
   for (std::string_view type; type != "IEND";) {
     const Chunk chunk = chunk_at(rest);
     if (chunk.whole.empty()) return {{}, Reason::image_truncated, "the file ends inside the PNG"};
     rest = rest.subspan(chunk.whole.size());
-    const bool is_first = type.empty();
     type = chunk.type;
-    if (is_first != (type == "IHDR") || (is_first && chunk.data().size() != kHeaderData)) {
-      return damaged(fmt::format("got chunk {} where IHDR belongs or a second IHDR", type));
+    std::string problem = add_chunk(chunk, pixels);
+    if (!problem.empty()) return damaged(std::move(problem));
+    if (type != "IHDR") continue;
+    const std::int64_t width = big_endian(chunk.data().data());
+    const std::int64_t height = big_endian(chunk.data().data() + 4);
+    if (width > kMaxPixels || height > kMaxPixels || width * height > kMaxPixels) {
+      return {{},
+              Reason::image_too_large,
+              fmt::format("got a PNG of {} x {} px, expected at most {} px", width, height, kMaxPixels)};
     }
-    if (!chunk.is_intact()) return damaged(fmt::format("chunk {} fails its checksum", type));
-    if (type != "IHDR" && type != "PLTE" && type != "IDAT" && type != "IEND") continue;
-    if (is_first) {
-      const std::int64_t width = big_endian(chunk.data().data());
-      const std::int64_t height = big_endian(chunk.data().data() + 4);
-      if (width > kMaxPixels || height > kMaxPixels || width * height > kMaxPixels) {
-        return {{},
-                Reason::image_too_large,
-                fmt::format("got a PNG of {} x {} px, expected at most {} px", width, height, kMaxPixels)};
-      }
-    }
-    plain.insert(plain.end(), chunk.whole.begin(), chunk.whole.end());
   }
-  return decode_plain(plain);
+  return decode_plain(pixels.file);
 }
 
 }  // namespace q3d::loaders

@@ -20,11 +20,13 @@ struct StoredCrop {
 // Covers `scale` times the box and two pixels on each side for the warp's neighbours, at min_side_px, or less
 // where the source has fewer pixels there.
 //
-// Fewer: the pixels are copied as they are, so a patch cut from the crop equals the one cut from the image
-// bit for bit. More: the crop is reduced by area averaging. At 480 px the box itself then has 253 px, which
-// is the patch's own resolution (0.69 to 1.28 crop px a patch px over the augmentation's scales), and it does
-// not alias as the official bilinear warp of a large picture does. Throws std::invalid_argument on wrong
-// image types, a scale below 1, or a side below the patch's.
+// Fewer: the pixels are copied as they are, so a patch cut from the crop is the one cut from the image, save
+// for single pixels whose position, a multiple of 1/32 px in OpenCV's warp, rounds the other way. More: the
+// crop is reduced by area averaging. At 480 px the box itself then has 253 px, which is the patch's own
+// resolution (0.69 to 1.28 crop px a patch px over the augmentation's scales), and it does not alias as the
+// official bilinear warp of a large picture does.
+//
+// Throws std::invalid_argument on wrong image types, a scale below 1, or a side below the patch's.
 StoredCrop make_stored_crop(const cv::Mat& rgb, const cv::Mat& mask, const SquareBox& box,
                             double scale = kStoredCropScale, int min_side_px = 480);
 

@@ -20,7 +20,7 @@ bool is_image_encoding(std::string_view name) {
   return std::find(kImageEncodings.begin(), kImageEncodings.end(), name) != kImageEncodings.end();
 }
 
-// What a reader without this document needs to know about each column.
+// What a reader without docs/shard-format.md needs to know about each column.
 std::string describe_columns() {
   nlohmann::json columns;
   for (const ShardColumn& column : shard_columns()) {
@@ -188,8 +188,8 @@ ShardReader::ShardReader(const std::filesystem::path& path) : table_(check_ident
 
 std::vector<ShardSample> ShardReader::samples(std::int64_t first, std::int64_t count) const {
   if (first < 0 || count < 0 || first > rows() || count > rows() - first) {
-    throw std::out_of_range(fmt::format("{}: rows {} to {}, but there are {}", table_.path().string(), first,
-                                        first + count, rows()));
+    throw std::out_of_range(fmt::format("{}: {} rows from {} on, but there are {}", table_.path().string(),
+                                        count, first, rows()));
   }
   std::vector<ShardSample> samples(static_cast<std::size_t>(count));
   if (samples.empty()) return samples;

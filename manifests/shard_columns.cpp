@@ -229,7 +229,7 @@ Columns verdict_columns() {
           "reason", "why it was discarded or failed; none for kept samples",
           [](auto& s) -> auto& { return s.judgement.reason; }, reason_from_string),
       text(
-          "detail", "the reason in words; empty for kept samples",
+          "detail", "the reason in words, or a remark on a kept sample",
           [](auto& s) -> auto& { return s.judgement.detail; }),
       numbers<double>(
           "initial_error", {}, "crop units", "L_proj of the network's prediction; NaN when not computed",

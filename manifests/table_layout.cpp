@@ -7,6 +7,7 @@
 #include <array>
 #include <optional>
 #include <stdexcept>
+#include <utility>
 
 #include "manifests/hdf5.h"
 
@@ -26,7 +27,7 @@ constexpr std::string_view kOffsetsSuffix = "_offsets";
 struct Layout {
   std::optional<ElementType> type;  // empty: text
   std::vector<std::int64_t> extents;
-  std::int64_t element_bytes = 0;
+  std::int64_t row_bytes = 0;
   std::int64_t bytes = 0;
   std::uint64_t file_offset = 0;
 };
@@ -48,22 +49,29 @@ bool is_fixed_text(hid_t type) {
   return H5Tget_class(type) == H5T_STRING && H5Tis_variable_str(type) == 0;
 }
 
-void read_extents(const std::string& name, hid_t dataset, Layout& layout) {
+void multiply(const std::string& name, std::int64_t& bytes, std::int64_t extent) {
+  if (__builtin_mul_overflow(bytes, extent, &bytes))
+    refuse(name, fmt::format("an extent of {} overflows", extent));
+}
+
+void read_extents(const std::string& name, hid_t dataset, std::int64_t element_bytes, Layout& layout) {
   const Handle space(H5Dget_space(dataset), H5Sclose, name);
   const int rank = check(H5Sget_simple_extent_ndims(space.get()), name);
   if (rank < 1) refuse(name, "got a scalar, expected one entry a row");
   std::vector<hsize_t> extents(static_cast<std::size_t>(rank));
   check(H5Sget_simple_extent_dims(space.get(), extents.data(), nullptr), name);
-  layout.bytes = layout.element_bytes;
-  for (std::size_t axis = 0; axis < extents.size(); ++axis) {
-    std::int64_t extent = 0;
-    if (__builtin_add_overflow(extents[axis], hsize_t{0}, &extent) ||
-        __builtin_mul_overflow(layout.bytes, extent, &layout.bytes)) {
-      refuse(name, fmt::format("its extents overflow (axis {} has {})", axis, extents[axis]));
-    }
-    if (axis > 0 && extent == 0) refuse(name, fmt::format("axis {} is empty", axis));
-    layout.extents.push_back(extent);
+  for (const hsize_t extent : extents) {
+    if (!std::in_range<std::int64_t>(extent)) refuse(name, fmt::format("an extent of {} overflows", extent));
+    layout.extents.push_back(static_cast<std::int64_t>(extent));
   }
+  // The row first: a table without rows must not hide a row whose size overflows.
+  layout.row_bytes = element_bytes;
+  for (std::size_t axis = 1; axis < layout.extents.size(); ++axis) {
+    if (layout.extents[axis] == 0) refuse(name, fmt::format("axis {} is empty", axis));
+    multiply(name, layout.row_bytes, layout.extents[axis]);
+  }
+  layout.bytes = layout.row_bytes;
+  multiply(name, layout.bytes, layout.extents[0]);
 }
 
 Layout read_layout(const std::string& name, hid_t file, std::uint64_t file_bytes) {
@@ -89,8 +97,7 @@ Layout read_layout(const std::string& name, hid_t file, std::uint64_t file_bytes
   if (element_bytes == 0 || element_bytes > file_bytes) {
     refuse(name, fmt::format("entries of {} bytes in a file of {}", element_bytes, file_bytes));
   }
-  layout.element_bytes = static_cast<std::int64_t>(element_bytes);
-  read_extents(name, dataset.get(), layout);
+  read_extents(name, dataset.get(), static_cast<std::int64_t>(element_bytes), layout);
   if (layout.bytes == 0) return layout;
   layout.file_offset = H5Dget_offset(dataset.get());
   if (layout.file_offset > file_bytes ||
@@ -158,8 +165,8 @@ std::map<std::string, std::string> read_attributes(hid_t file, std::uint64_t fil
 
 std::vector<std::int64_t> read_offsets(const FileDescriptor& file, const std::string& name, std::int64_t rows,
                                        const Layout& offsets, std::int64_t flat_bytes) {
-  if (offsets.type != ElementType::int64 || offsets.extents != std::vector<std::int64_t>{rows + 1}) {
-    refuse(name + "_offsets", fmt::format("expected int64 ({})", rows + 1));
+  if (offsets.type != ElementType::int64 || offsets.extents.size() != 1 || offsets.extents[0] - 1 != rows) {
+    refuse(name + "_offsets", fmt::format("expected {} rows + 1 of int64", rows));
   }
   std::vector<std::int64_t> values(static_cast<std::size_t>(rows) + 1);
   file.read_at(offsets.file_offset, std::as_writable_bytes(std::span(values)));
@@ -170,15 +177,14 @@ std::vector<std::int64_t> read_offsets(const FileDescriptor& file, const std::st
 }
 
 TableReader::Column make_column(const std::string& name, std::int64_t rows, const Layout& layout) {
-  if (layout.extents[0] != rows)
-    refuse(name, fmt::format("got {} rows, expected {}", layout.extents[0], rows));
+  const std::int64_t got = layout.extents[0];
+  if (got != rows) refuse(name, fmt::format("got {} rows, expected {}", got, rows));
   TableReader::Column column;
   column.file_offset = layout.file_offset;
-  column.row_bytes = layout.element_bytes;
+  column.row_bytes = layout.row_bytes;
   if (layout.type) {
     column.type = *layout.type;
     column.row_shape.assign(layout.extents.begin() + 1, layout.extents.end());
-    column.row_bytes *= elements_per_row(column.row_shape);
   } else {
     column.kind = TableReader::Kind::text;
     if (layout.extents.size() != 1) refuse(name, "text must have one axis");

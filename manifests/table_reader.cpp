@@ -30,8 +30,8 @@ const TableReader::Column& TableReader::find(const std::string& name, Kind kind,
                                          kKindNames.at(static_cast<std::size_t>(kind))));
   }
   if (first < 0 || count < 0 || first > rows_ || count > rows_ - first) {
-    throw std::out_of_range(fmt::format("{}: rows {} to {} of column {}, which has {}", path().string(),
-                                        first, first + count, name, rows_));
+    throw std::out_of_range(fmt::format("{}: {} rows from {} on of column {}, which has {}", path().string(),
+                                        count, first, name, rows_));
   }
   return found->second;
 }

@@ -63,11 +63,10 @@ void check_table(const Table& table) {
     }
   }
   for (const auto& [name, value] : table.attributes) {
-    if (name == "rows" || value.size() > kMaxAttributeBytes || value.find('\0') != std::string::npos) {
+    if (name == "rows") throw std::logic_error("the attribute name rows is taken");
+    if (value.size() > kMaxAttributeBytes || value.find('\0') != std::string::npos) {
       throw std::logic_error(
-          fmt::format("attribute {}: the name is taken, or its {} bytes are too many or hold "
-                      "a NUL",
-                      name, value.size()));
+          fmt::format("attribute {}: {} bytes are too many, or it holds a NUL", name, value.size()));
     }
   }
 }
@@ -123,11 +122,11 @@ void write_text(hdf5::MemoryFile& file, const std::string& name, const std::vect
 void write_blobs(hdf5::MemoryFile& file, const std::string& name,
                  const std::vector<std::vector<std::byte>>& values) {
   std::vector<std::int64_t> offsets{0};
+  for (const auto& value : values)
+    offsets.push_back(offsets.back() + static_cast<std::int64_t>(value.size()));
   std::vector<std::byte> flat;
-  for (const auto& value : values) {
-    flat.insert(flat.end(), value.begin(), value.end());
-    offsets.push_back(static_cast<std::int64_t>(flat.size()));
-  }
+  flat.reserve(static_cast<std::size_t>(offsets.back()));
+  for (const auto& value : values) flat.insert(flat.end(), value.begin(), value.end());
   file.dataset(name, H5T_STD_U8LE, {flat.size()}, flat.data());
   file.dataset(name + "_offsets", H5T_STD_I64LE, {offsets.size()}, offsets.data());
 }

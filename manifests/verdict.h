@@ -23,7 +23,7 @@ LabelKind label_kind_from_string(std::string_view name);  // throws std::invalid
 struct Judgement {
   Verdict verdict = Verdict::failed;
   Reason reason = Reason::none;
-  std::string detail;  // for people; empty for kept samples
+  std::string detail;  // for people; of a kept sample, a remark if there is one
   // L_proj in crop units (crop side = 1); NaN when it was never computed.
   double initial_error = std::numeric_limits<double>::quiet_NaN();
   double final_error = std::numeric_limits<double>::quiet_NaN();

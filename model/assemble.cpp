@@ -19,8 +19,9 @@ void require_features(const PrimaNet& net, const ImageFeatures& features) {
   const torch::Tensor& bio = features.bio_token;
   const std::int64_t width = net.config().embed_dim;
   if (tokens.dim() != 3 || tokens.size(1) != kImageTokens || tokens.size(2) != width) {
-    throw std::invalid_argument(fmt::format("image_tokens: expected (B, {}, {}), got {} dimensions, {} numbers",
-                                            kImageTokens, width, tokens.dim(), tokens.numel()));
+    throw std::invalid_argument(
+        fmt::format("image_tokens: expected (B, {}, {}), got {} dimensions, {} numbers", kImageTokens, width,
+                    tokens.dim(), tokens.numel()));
   }
   if (bio.dim() != 2 || bio.size(0) != tokens.size(0) || bio.size(1) != width) {
     throw std::invalid_argument(fmt::format("bio_token: expected ({}, {}), got {} dimensions, {} numbers",

@@ -49,8 +49,8 @@ std::vector<std::string> find_faults(const smal::SafeTensors& file, const PrimaN
   const auto parameters = net.named_parameters();
   for (const auto& parameter : parameters) {
     if (!file.contains(parameter.key())) {
-      faults.push_back(fmt::format("{}: missing, expected {}", parameter.key(),
-                                   shape_text(parameter.value().sizes())));
+      faults.push_back(
+          fmt::format("{}: missing, expected {}", parameter.key(), shape_text(parameter.value().sizes())));
       continue;
     }
     const torch::Tensor stored = file.tensor(parameter.key());
@@ -72,8 +72,8 @@ std::vector<std::string> find_faults(const smal::SafeTensors& file, const PrimaN
   return faults;
 }
 
-// Drops the file's pages from this process once their numbers are copied; the kernel's cache keeps them. Without
-// this the mapping of a full-size file counts as a second copy of the weights.
+// Drops the file's pages from this process once their numbers are copied; the kernel's cache keeps them.
+// Without this the mapping of a full-size file counts as a second copy of the weights.
 void release_pages(const torch::Tensor& mapped) {
   const auto page = static_cast<std::uintptr_t>(::sysconf(_SC_PAGESIZE));
   const auto begin = reinterpret_cast<std::uintptr_t>(mapped.const_data_ptr());
@@ -96,8 +96,8 @@ std::vector<TensorSpec> expected_tensors(const PrimaConfig& config) {
 bool is_allowed_extra(const std::string& name) {
   static constexpr std::string_view kText = "bioclip_embedding.species_model.";
   static constexpr std::array<std::string_view, 7> kTextTower{
-      "transformer.", "token_embedding.", "positional_embedding", "ln_final.",
-      "text_projection", "logit_scale",   "attn_mask"};
+      "transformer.", "token_embedding.", "positional_embedding", "ln_final.", "text_projection",
+      "logit_scale",  "attn_mask"};
   static constexpr std::array<std::string_view, 5> kOthers{"smal.", "discriminator.", "shape_prior_loss.",
                                                            "pose_prior_loss.", "training."};
   const std::string_view view(name);
@@ -114,10 +114,10 @@ bool is_allowed_extra(const std::string& name) {
 PrimaConfig checkpoint_config(const smal::SafeTensors& file) {
   const auto entry = file.metadata().find(kConfigKey);
   if (entry == file.metadata().end()) {
-    throw std::runtime_error(
-        fmt::format("{}: no '{}' in the metadata, so the network's sizes are unknown; import official weights "
-                    "with tools/import_assets.py",
-                    file.path().string(), kConfigKey));
+    throw std::runtime_error(fmt::format(
+        "{}: no '{}' in the metadata, so the network's sizes are unknown; import official weights "
+        "with tools/import_assets.py",
+        file.path().string(), kConfigKey));
   }
   try {
     return config_from_json(nlohmann::json::parse(entry->second));
@@ -132,8 +132,8 @@ std::shared_ptr<PrimaNet> load_net(const smal::SafeTensors& file, const PrimaCon
   const torch::NoGradGuard no_grad;
   const PrimaNet plan(config, {torch::kMeta, placement.matrix_dtype});
   if (const auto faults = find_faults(file, plan, asset); !faults.empty()) {
-    std::string message = fmt::format("{}: {} tensors do not fit the network:", file.path().string(),
-                                      faults.size());
+    std::string message =
+        fmt::format("{}: {} faults keep it from fitting the network:", file.path().string(), faults.size());
     for (const std::string& fault : faults) message += "\n  " + fault;
     throw std::runtime_error(message);
   }

@@ -88,9 +88,9 @@ DeviceChoice choose_device(const std::string& name) {
         fmt::format("device '{}' is unknown; use auto, cpu, cuda or cuda:<number>", name));
   }
   if (const auto reason = why_unusable(*index)) {
-    throw std::runtime_error(fmt::format(
-        "device '{}' cannot be used ({} CUDA devices found): {}; use cpu or auto", name,
-        torch::cuda::device_count(), *reason));
+    throw std::runtime_error(
+        fmt::format("device '{}' cannot be used ({} CUDA devices found): {}; use cpu or auto", name,
+                    torch::cuda::device_count(), *reason));
   }
   return cuda_choice(*index);
 }

@@ -1,8 +1,9 @@
 // Fresh weights. A seed gives the same bytes on every machine.
+#include "model/init.h"
+
 #include <cmath>
 #include <string_view>
 
-#include "model/checkpoint.h"
 #include "model/prima.h"
 #include "model/seeded_uniform.h"
 
@@ -41,6 +42,8 @@ double uniform_bound(const TensorSpec& spec) {
   return 1.0 / std::sqrt(fan_in);
 }
 
+}  // namespace
+
 torch::Tensor initial_tensor(const TensorSpec& spec, std::uint64_t seed) {
   if (ends_with(spec.name, "init_pose")) {  // the identity, 35 times: columns (1, 0, 0) and (0, 1, 0)
     return torch::tensor({1.0F, 0.0F, 0.0F, 0.0F, 1.0F, 0.0F}).repeat({1, kPose6d / 6});
@@ -54,7 +57,12 @@ torch::Tensor initial_tensor(const TensorSpec& spec, std::uint64_t seed) {
   return tensor;
 }
 
-}  // namespace
+void initialise(PrimaNet& net, std::uint64_t seed) {
+  const torch::NoGradGuard no_grad;
+  for (auto& parameter : net.named_parameters()) {
+    parameter.value().copy_(initial_tensor({parameter.key(), parameter.value().sizes().vec()}, seed));
+  }
+}
 
 void write_initial_checkpoint(const std::filesystem::path& path, const PrimaConfig& config,
                               std::uint64_t seed, torch::ScalarType dtype) {

@@ -23,7 +23,9 @@ Linear::Linear(std::int64_t in, std::int64_t out, const Placement& placement) {
   bias = register_parameter("bias", torch::empty({out}, placement.matrix()));
 }
 
-torch::Tensor Linear::forward(const torch::Tensor& x) const { return affine(x, weight, bias); }
+torch::Tensor Linear::forward(const torch::Tensor& x) const {
+  return affine(x, weight, bias);
+}
 
 LayerNorm::LayerNorm(std::int64_t width, double epsilon, const Placement& placement) : epsilon_(epsilon) {
   weight_ = register_parameter("weight", torch::empty({width}, placement.vector()));
@@ -60,7 +62,8 @@ torch::Tensor attend(const torch::Tensor& query, const torch::Tensor& key, const
 MultiheadAttention::MultiheadAttention(std::int64_t width, std::int64_t heads, double dropout,
                                        const Placement& placement)
     : width_(width), heads_(heads), dropout_(dropout) {
-  in_proj_weight_ = register_parameter("in_proj_weight", torch::empty({3 * width, width}, placement.matrix()));
+  in_proj_weight_ =
+      register_parameter("in_proj_weight", torch::empty({3 * width, width}, placement.matrix()));
   in_proj_bias_ = register_parameter("in_proj_bias", torch::empty({3 * width}, placement.matrix()));
   out_proj_ = register_module("out_proj", std::make_shared<Linear>(width, width, placement));
 }
@@ -108,8 +111,12 @@ Mlp::Mlp(std::int64_t in, std::int64_t hidden, std::int64_t out, const Placement
   out_ = register_module("2", std::make_shared<Linear>(hidden, out, placement.in_float32()));
 }
 
-torch::Tensor Mlp::forward(const torch::Tensor& x) const { return apply_mlp(weights(), x, negative_slope_); }
+torch::Tensor Mlp::forward(const torch::Tensor& x) const {
+  return apply_mlp(weights(), x, negative_slope_);
+}
 
-MlpWeights Mlp::weights() const { return {hidden_->weight, hidden_->bias, out_->weight, out_->bias}; }
+MlpWeights Mlp::weights() const {
+  return {hidden_->weight, hidden_->bias, out_->weight, out_->bias};
+}
 
 }  // namespace q3d::model

@@ -1,5 +1,5 @@
-// The network's modules under one roof, with the official checkpoint's parameter names. Starts in training mode,
-// like every torch module; Prima::load hands out a frozen one in evaluation mode.
+// The network's modules under one roof, with the official checkpoint's parameter names. Starts in training
+// mode, like every torch module; Prima::load hands out a frozen one in evaluation mode.
 #pragma once
 
 #include <torch/torch.h>

@@ -81,6 +81,8 @@ Prediction Prima::predict(const ImageFeatures& features, bool with_vertices) con
   return assemble(*net_, body_, output, initial_betas, with_vertices);
 }
 
-const PrimaConfig& Prima::config() const { return net_->config(); }
+const PrimaConfig& Prima::config() const {
+  return net_->config();
+}
 
 }  // namespace q3d::model

@@ -38,14 +38,14 @@ class PrimaNet;  // the torch module, with the official checkpoint's parameter n
 // A loaded network on its device. Copies share the weights. Not thread-safe: one caller at a time.
 //
 // dtype float32, or bfloat16: then the matrices of both encoders, of the decoder layers and of the keypoint
-// readouts are held and multiplied in bfloat16, while the residual streams, layer norms, embeddings, regression
-// heads, the body, the losses and all of test-time adaptation's parameters stay float32.
+// readouts are held and multiplied in bfloat16, while the residual streams, layer norms, embeddings,
+// regression heads, the body, the losses and all of test-time adaptation's parameters stay float32.
 class Prima {
  public:
-  // Strict: throws std::runtime_error naming every missing, extra, wrong-shaped or wrongly typed tensor. The text
-  // tower, the discriminator, the priors and smal.* buffers are the allowed extras (smal.* must agree with the
-  // asset's shapes). The network comes frozen and in evaluation mode. Throws std::invalid_argument on another
-  // dtype.
+  // Strict: throws std::runtime_error naming every missing, extra, wrong-shaped or wrongly typed tensor. The
+  // text tower, the discriminator, the priors and smal.* buffers are the allowed extras (smal.* must agree
+  // with the asset's shapes). The network comes frozen and in evaluation mode. Throws std::invalid_argument
+  // on another dtype.
   static Prima load(const std::filesystem::path& checkpoint, const std::filesystem::path& smal_asset,
                     torch::Device device, torch::ScalarType dtype = torch::kFloat32);
   // Takes the net as it is. Throws std::invalid_argument when it and the body are on different devices.
@@ -68,11 +68,11 @@ class Prima {
   smal::SmalBody body_;
 };
 
-// A seeded checkpoint of the given sizes: every tensor of the network under its official name (CLIP's text tower,
-// the discriminator, the priors and the body are not part of it). The same seed gives the same bytes on every
-// machine. Sets the identity 6D pose (all-zero would give NaN) and the official initial camera. dtype: float32,
-// float16 or bfloat16. Throws std::runtime_error when the file cannot be written.
-void write_initial_checkpoint(const std::filesystem::path& path, const PrimaConfig& config, std::uint64_t seed,
-                              torch::ScalarType dtype = torch::kFloat32);
+// A seeded checkpoint of the given sizes: every tensor of the network under its official name (CLIP's text
+// tower, the discriminator, the priors and the body are not part of it). The same seed gives the same bytes
+// on every machine. Sets the identity 6D pose (all-zero would give NaN) and the official initial camera.
+// dtype: float32, float16 or bfloat16. Throws std::runtime_error when the file cannot be written.
+void write_initial_checkpoint(const std::filesystem::path& path, const PrimaConfig& config,
+                              std::uint64_t seed, torch::ScalarType dtype = torch::kFloat32);
 
 }  // namespace q3d::model

@@ -62,6 +62,7 @@ void check_arguments(const Prima& prima, const ImageFeatures& features, const to
   require_features(prima.net(), features);
   require(!prima.net().is_training(), "the network is in training mode; call eval() first");
   const std::int64_t batch = features.bio_token.size(0);
+  require(batch >= 1, "an empty batch");
   require(keypoints.dim() == 3 && keypoints.size(0) == batch && keypoints.size(1) == kKeypoints &&
               keypoints.size(2) == 3,
           fmt::format("keypoints: expected ({}, {}, 3), got {} dimensions, {} numbers", batch, kKeypoints,

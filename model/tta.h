@@ -29,7 +29,7 @@ struct TtaOptions {
 struct TtaSchedule {
   int iterations = 10;
   double stop_below = 0.0;  // stop as soon as L_proj is below this (tau_low); 0 = never
-  double min_gain = 0.0;    // give up after `gain_window` iterations when the relative gain is less; 0 = never
+  double min_gain = 0.0;  // give up after `gain_window` iterations when the relative gain is less; 0 = never
   int gain_window = 10;
 };
 
@@ -45,8 +45,8 @@ struct TtaResult {
 };
 
 // keypoints (B, 26, 3): x, y in crop units and a weight; visible iff weight > 0 (the value is not a weight
-// here). schedules: one an instance. An instance without visible keypoints is left as it is. One whose loss or
-// numbers become non-finite keeps its last finite iterate. Vertices are not computed. Throws
+// here). schedules: one an instance. An instance without visible keypoints is left as it is. One whose loss
+// or numbers become non-finite keeps its last finite iterate. Vertices are not computed. Throws
 // std::invalid_argument on shapes that disagree, a network in training mode, or options out of range.
 TtaResult adapt(const Prima& prima, const ImageFeatures& features, const torch::Tensor& keypoints,
                 const std::vector<TtaSchedule>& schedules, const TtaOptions& options);

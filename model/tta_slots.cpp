@@ -25,7 +25,10 @@ std::vector<torch::Tensor> to_list(const AdaptedParameters& parameters) {
 }
 
 AdaptedParameters from_list(const std::vector<torch::Tensor>& t) {
-  return {t.at(0), t.at(1), {t.at(2), t.at(3), t.at(4), t.at(5)}, {t.at(6), t.at(7), t.at(8), t.at(9)},
+  return {t.at(0),
+          t.at(1),
+          {t.at(2), t.at(3), t.at(4), t.at(5)},
+          {t.at(6), t.at(7), t.at(8), t.at(9)},
           {t.at(10), t.at(11), t.at(12), t.at(13)}};
 }
 
@@ -49,7 +52,8 @@ TtaSlots::TtaSlots(const AdaptedParameters& initial, DecoderMemory memory, torch
 
 std::vector<torch::Tensor> TtaSlots::parameters(bool requires_grad) const {
   std::vector<torch::Tensor> leaves;
-  for (const auto& rows : parameters_) leaves.push_back(active(rows).detach().set_requires_grad(requires_grad));
+  for (const auto& rows : parameters_)
+    leaves.push_back(active(rows).detach().set_requires_grad(requires_grad));
   return leaves;
 }
 
@@ -60,7 +64,9 @@ DecoderMemory TtaSlots::memory() const {
   return memory;
 }
 
-torch::Tensor TtaSlots::initial_betas() const { return active(initial_betas_); }
+torch::Tensor TtaSlots::initial_betas() const {
+  return active(initial_betas_);
+}
 
 KeypointTargets TtaSlots::targets() const {
   return {active(targets_.xy), active(targets_.visible), active(targets_.count)};
@@ -89,8 +95,7 @@ void TtaSlots::remove(std::int64_t slot) {
   for (const auto* group : {&parameters_, &first_moments_, &second_moments_, &memory_.keys_values}) {
     for (const auto& rows : *group) move_row(rows);
   }
-  for (const auto& rows :
-       {memory_.sampled, initial_betas_, targets_.xy, targets_.visible, targets_.count}) {
+  for (const auto& rows : {memory_.sampled, initial_betas_, targets_.xy, targets_.visible, targets_.count}) {
     move_row(rows);
   }
   instances_[static_cast<std::size_t>(slot)] = instances_.back();

@@ -34,9 +34,7 @@ class VitMlp : public torch::nn::Module {
     fc2_ = register_module("fc2", std::make_shared<Linear>(hidden, width, placement));
   }
 
-  torch::Tensor forward(const torch::Tensor& x) const {
-    return fc2_->forward(torch::gelu(fc1_->forward(x)));
-  }
+  torch::Tensor forward(const torch::Tensor& x) const { return fc2_->forward(torch::gelu(fc1_->forward(x))); }
 
  private:
   std::shared_ptr<Linear> fc1_;
@@ -77,14 +75,16 @@ class VitBlock : public torch::nn::Module {
 
 Vit::Vit(const PrimaConfig& config, const Placement& placement) {
   const std::int64_t width = config.embed_dim;
-  pos_embed_ = register_parameter("pos_embed", torch::empty({1, kImageTokens + 1, width}, placement.vector()));
+  pos_embed_ =
+      register_parameter("pos_embed", torch::empty({1, kImageTokens + 1, width}, placement.vector()));
   cls_token_ = register_parameter("cls_token", torch::empty({1, 1, width}, placement.vector()));
   const auto patch_embed = register_module("patch_embed", std::make_shared<torch::nn::Module>());
   patch_ = patch_embed->register_module(
       "proj", std::make_shared<PatchConv>(width, kPatchPx, kPatchPaddingPx, /*has_bias=*/true, placement));
   const auto blocks = register_module("blocks", std::make_shared<torch::nn::Module>());
   for (std::int64_t i = 0; i < config.depth; ++i) {
-    const double rate = config.depth == 1 ? 0.0 : config.drop_path * static_cast<double>(i) / (config.depth - 1);
+    const double rate =
+        config.depth == 1 ? 0.0 : config.drop_path * static_cast<double>(i) / (config.depth - 1);
     blocks_.push_back(
         blocks->register_module(std::to_string(i), std::make_shared<VitBlock>(config, rate, placement)));
   }

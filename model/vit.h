@@ -21,7 +21,8 @@ class Vit : public torch::nn::Module {
  public:
   Vit(const PrimaConfig& config, const Placement& placement);
 
-  // images (B, 3, 256, 192) float32, normalised -> (B, 192, embed_dim) float32, row-major over 16 x 12 tokens.
+  // images (B, 3, 256, 192) float32, normalised -> (B, 192, embed_dim) float32, row-major over 16 x 12
+  // tokens.
   torch::Tensor forward(const torch::Tensor& images, const Observer& observe = {}) const;
 
  private:

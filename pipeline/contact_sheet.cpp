@@ -28,7 +28,8 @@ cv::Mat network_crop(const manifests::ShardSample& sample) {
   const cv::Mat stored = loaders::decode_stored(sample.crop, 3);
   const auto& [center_x, center_y, side] = sample.patch_box;
   const loaders::Affine from_image = loaders::patch_from_image({center_x, center_y, side}, kTilePx);
-  return loaders::warp_patch(stored, {}, loaders::patch_from_stored_crop(from_image, sample.crop_from_image)).rgb;
+  return loaders::warp_patch(stored, {}, loaders::patch_from_stored_crop(from_image, sample.crop_from_image))
+      .rgb;
 }
 
 cv::Point to_tile(float x, float y) {

@@ -17,8 +17,6 @@ using manifests::Verdict;
 using nlohmann::json;
 using nlohmann::ordered_json;
 
-constexpr const char* kToolkitVersion = "0.1.0";
-
 ordered_json to_json(const Counts& counts) {
   return {{"candidates", counts.candidates},
           {"retained", counts.retained},
@@ -142,7 +140,7 @@ std::string dataset_json(const DatasetInputs& inputs, const std::vector<manifest
                                  {"version", inputs.config->version},
                                  {"key", keys.dataset},
                                  {"content_id", content_id(shards)},
-                                 {"toolkit", kToolkitVersion},
+                                 {"toolkit", Q3D_VERSION},
                                  {"counts", to_json(counts)},
                                  {"thresholds",
                                   {{"tau_low", inputs.thresholds->tau_low},

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "manifests/record_json.h"
+#include "pipeline/errors.h"
 #include "pipeline/interrupt.h"
 
 namespace q3d::pipeline {
@@ -29,6 +30,23 @@ void require_unique_ids(const std::vector<Candidate>& candidates) {
   }
 }
 
+loaders::Dataset load(const loaders::DatasetOptions& options) {
+  try {
+    return loaders::load_dataset(options);
+  } catch (const std::invalid_argument& error) {
+    throw ConfigError(fmt::format("dataset {}: {}", options.name, error.what()));
+  }
+}
+
+// Paths of this machine do not belong into a dataset: equal builds in different folders have equal verdicts.
+std::string without_root(std::string text, const std::filesystem::path& root) {
+  const std::string prefix = (root / "").string();
+  for (std::size_t at = text.find(prefix); at != std::string::npos; at = text.find(prefix, at)) {
+    text.erase(at, prefix.size());
+  }
+  return text;
+}
+
 // A picture that cannot be read now is a failed sample, never a failed build.
 void digest_pictures(std::vector<Candidate>& candidates, manifests::DigestCache& digests) {
   tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t i) {
@@ -36,9 +54,9 @@ void digest_pictures(std::vector<Candidate>& candidates, manifests::DigestCache&
     if (candidate.record.failure != Reason::none || interrupted()) return;
     try {
       candidate.image_sha256 = digests.digest(candidate.record.image_path);
-    } catch (const std::runtime_error& error) {
+    } catch (const std::runtime_error&) {
       candidate.record.failure = Reason::image_missing;
-      candidate.record.failure_detail = error.what();
+      candidate.record.failure_detail = candidate.record.image_ref + " cannot be read";
     }
   });
   throw_if_interrupted();
@@ -67,10 +85,13 @@ Ingest ingest(const BuildConfig& config, manifests::DigestCache& digests) {
   Ingest result;
   for (const auto& options : config.datasets) {
     throw_if_interrupted();
-    loaders::Dataset dataset = loaders::load_dataset(options);
+    loaders::Dataset dataset = load(options);
     const std::string name = options.name + "/" + options.split;
     result.annotation_digests[name] = digests.digest(annotation_path(options));
-    for (auto& record : dataset.records) result.candidates.push_back({std::move(record), {}});
+    for (auto& record : dataset.records) {
+      record.failure_detail = without_root(std::move(record.failure_detail), options.root);
+      result.candidates.push_back({std::move(record), {}});
+    }
     for (const auto& note : dataset.notes) result.notes.push_back(name + ": " + note);
   }
   require_unique_ids(result.candidates);

@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
 #include <stdexcept>
 
 #include "manifests/atomic_file.h"
@@ -16,20 +17,11 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
-struct ShardFile {
-  fs::path path;
-  std::int64_t rows = 0;
-};
-
-std::vector<ShardFile> shard_files(const fs::path& path) {
-  if (!fs::is_directory(path)) {
-    return {{path, static_cast<std::int64_t>(manifests::read_shard(path).samples.size())}};
-  }
+std::vector<fs::path> shard_files(const fs::path& path) {
+  if (!fs::is_directory(path)) return {path};
   const fs::path folder = dataset_folder(path);
-  std::vector<ShardFile> files;
-  for (const ShardEntry& shard : read_dataset_manifest(folder).shards) {
-    files.push_back({folder / shard.file, shard.rows});
-  }
+  std::vector<fs::path> files;
+  for (const ShardEntry& shard : read_dataset_manifest(folder).shards) files.push_back(folder / shard.file);
   return files;
 }
 
@@ -91,11 +83,11 @@ ordered_json describe(const fs::path& path) {
 }
 
 ordered_json describe_sample(const fs::path& path, const std::string& id) {
-  for (const ShardFile& file : shard_files(path)) {
-    for (const auto& sample : manifests::read_shard(file.path).samples) {
-      if (sample.record.id != id) continue;
-      return describe_whole(file.path, sample);
-    }
+  for (const fs::path& file : shard_files(path)) {
+    const manifests::ShardReader shard(file);
+    const std::vector<std::string> ids = shard.table().text("id", 0, shard.rows());
+    const auto found = std::find(ids.begin(), ids.end(), id);
+    if (found != ids.end()) return describe_whole(file, shard.samples(found - ids.begin(), 1).front());
   }
   throw std::runtime_error(
       fmt::format("{}: no sample {} in the shards; verdicts.csv lists every candidate with what "
@@ -104,22 +96,19 @@ ordered_json describe_sample(const fs::path& path, const std::string& id) {
 }
 
 std::vector<manifests::ShardSample> spread_samples(const fs::path& path, int count) {
-  const std::vector<ShardFile> files = shard_files(path);
+  std::vector<manifests::ShardReader> shards;
   std::int64_t total = 0;
-  for (const ShardFile& file : files) total += file.rows;
+  for (const fs::path& file : shard_files(path)) total += shards.emplace_back(file).rows();
   const std::int64_t wanted = std::min<std::int64_t>(count, total);
   std::vector<manifests::ShardSample> chosen;
   std::int64_t first = 0;
-  std::int64_t next = 0;
-  for (const ShardFile& file : files) {
-    const auto position = [&] { return next * total / wanted; };
-    if (next < wanted && position() < first + file.rows) {
-      std::vector<manifests::ShardSample> samples = manifests::read_shard(file.path).samples;
-      for (; next < wanted && position() < first + file.rows; ++next) {
-        chosen.push_back(std::move(samples[static_cast<std::size_t>(position() - first)]));
-      }
+  for (const manifests::ShardReader& shard : shards) {
+    for (auto next = static_cast<std::int64_t>(chosen.size()); next < wanted; ++next) {
+      const std::int64_t row = next * total / wanted - first;
+      if (row >= shard.rows()) break;
+      chosen.push_back(std::move(shard.samples(row, 1).front()));
     }
-    first += file.rows;
+    first += shard.rows();
   }
   return chosen;
 }

@@ -12,6 +12,7 @@
 #include "model/device.h"
 #include "model/prima.h"
 #include "model/tta.h"
+#include "pipeline/errors.h"
 #include "smal/synthetic_quadruped.h"
 
 namespace q3d::pipeline {

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "filters/metrics.h"
+#include "loaders/box.h"
 #include "loaders/crop.h"
 #include "loaders/encode.h"
 #include "loaders/image.h"
@@ -64,26 +65,28 @@ DecodedSample decode_sample(const manifests::SampleRecord& record, Wanted want, 
     sample.detail = image.detail;
     return sample;
   }
-  const loaders::DecodedImage mask = loaders::decode_mask(record.mask_path);
-  const bool has_mask = mask.failure == Reason::none && mask.rgb.size() == image.rgb.size();
-  const cv::Mat silhouette = has_mask ? mask.rgb : cv::Mat();
+  // A mask that is absent, unreadable or no silhouette leaves the sample without one; the latter two are
+  // told.
+  const loaders::DecodedMask mask = loaders::decode_mask(record.mask_path);
+  const bool has_mask = mask.silhouette.size() == image.rgb.size();
+  if (!has_mask && mask.kind != loaders::MaskKind::absent) {
+    sample.detail =
+        "the mask is left out: " + (mask.detail.empty() ? "it is not of the picture's size" : mask.detail);
+  }
   sample.image_width_px = image.rgb.cols;
   sample.image_height_px = image.rgb.rows;
   sample.has_mask = has_mask;
-  const manifests::Box& box = record.box;
-  if (box.x_px >= image.rgb.cols || box.y_px >= image.rgb.rows || box.x_px + box.w_px <= 0 ||
-      box.y_px + box.h_px <= 0) {
-    sample.failure = Reason::box_outside_image;
-    sample.detail = fmt::format("box x={} y={} w={} h={} px, picture {} x {} px", box.x_px, box.y_px,
-                                box.w_px, box.h_px, image.rgb.cols, image.rgb.rows);
+  if (const auto problem = loaders::find_box_problem(record.box, image.rgb.cols, image.rgb.rows)) {
+    sample.failure = problem->reason;
+    sample.detail = fmt::format("got {}, expected {}", problem->got, problem->expected);
     return sample;
   }
-  const loaders::SquareBox square = loaders::square_box(box);
+  const loaders::SquareBox square = loaders::square_box(record.box);
   if (want.patch) {
     const cv::Mat patch = loaders::make_patch(image.rgb, cv::Mat(), square).rgb;
     sample.patch.assign(patch.datastart, patch.dataend);
   }
-  if (want.stored_crop) store_crop(sample, image.rgb, silhouette, square, shards);
+  if (want.stored_crop) store_crop(sample, image.rgb, has_mask ? mask.silhouette : cv::Mat(), square, shards);
   sample.decoded = true;
   return sample;
 }
@@ -149,12 +152,17 @@ void judge_unit(UnitWork& work, const filters::Thresholds& thresholds) {
             ? failed(predicted.failure, predicted.detail)
             : filters::judge_initial(initial_error(work.candidates[i], predicted), thresholds);
   }
-  if (!work.refined) return;
-  for (const RefinedSample& refined : *work.refined) {
-    work.judgements[refined.sample] =
-        refined.curve.empty()
-            ? failed(Reason::prediction_not_finite, "nothing could be measured in adaptation")
-            : filters::judge_adapted(refined.curve, thresholds);
+  if (work.refined) {
+    for (const RefinedSample& refined : *work.refined) {
+      work.judgements[refined.sample] =
+          refined.curve.empty()
+              ? failed(Reason::prediction_not_finite, "nothing could be measured in adaptation")
+              : filters::judge_adapted(refined.curve, thresholds);
+    }
+  }
+  for (std::size_t i = 0; i < work.candidates.size(); ++i) {
+    std::string& detail = work.judgements[i].detail;
+    if (detail.empty()) detail = (*work.predicted)[i].detail;
   }
 }
 

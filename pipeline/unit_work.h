@@ -14,7 +14,7 @@ namespace q3d::pipeline {
 // What predict knows of one candidate: a body, or why there is none.
 struct PredictedSample {
   manifests::Reason failure = manifests::Reason::none;
-  std::string detail;
+  std::string detail;  // of the failure, or a remark (a mask that was left out)
   int image_width_px = 0;
   int image_height_px = 0;
   bool has_mask = false;

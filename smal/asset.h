@@ -3,29 +3,24 @@
 
 #include <torch/torch.h>
 
-#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
 
+#include "smal/sizes.h"
+
 namespace q3d::smal {
 
-inline constexpr std::int64_t kNumJoints = 35;
-inline constexpr std::int64_t kNumBetas = 41;
-inline constexpr std::int64_t kNumKeypoints = 26;
-inline constexpr std::int64_t kNumVertices = 3889;
-inline constexpr std::int64_t kNumFaces = 7774;
-
 struct SmalAsset {
-  torch::Tensor
-      v_template;           // (V, 3) float32, model units (about metres): x to the head, y up, z to the right
-  torch::Tensor faces;      // (F, 3) int32, counter-clockwise seen from outside
-  torch::Tensor shapedirs;  // (V, 3, 41) float32
-  torch::Tensor posedirs;   // (306, 3 V) float32: row 9 (joint - 1) + 3 r + c, column 3 vertex + xyz
-  torch::Tensor j_regressor;                                 // (35, V) float32, rows sum to 1
-  torch::Tensor lbs_weights;                                 // (V, 35) float32, rows sum to 1
-  torch::Tensor parents;                                     // (35) int32, parents[0] = -1, parents[j] < j
+  // Model units are about metres; x to the head, y up, z to the right.
+  torch::Tensor v_template;   // (V, 3) float32
+  torch::Tensor faces;        // (F, 3) int32, counter-clockwise seen from outside
+  torch::Tensor shapedirs;    // (V, 3, 41) float32
+  torch::Tensor posedirs;     // (306, 3 V) float32: row 9 (joint - 1) + 3 r + c, column 3 vertex + xyz
+  torch::Tensor j_regressor;  // (35, V) float32, rows sum to 1
+  torch::Tensor lbs_weights;  // (V, 35) float32, rows sum to 1
+  torch::Tensor parents;      // (35) int32, parents[0] = -1, parents[j] < j
   std::vector<std::vector<std::int64_t>> keypoint_vertices;  // 26 groups of vertex indices
   std::string name;
   std::string licence;

@@ -19,7 +19,11 @@ layers=(--config "$config")
 if ! grep -q '"tau_low"' "$config"; then
   # One thresholds file a config: thresholds of another pool or network would be wrong.
   thresholds=$out/thresholds-$(basename "$config" .json).json
-  [ -f "$thresholds" ] || "$program" calibrate "${layers[@]}" --out "$out" --write "$thresholds"
+  if [ -f "$thresholds" ]; then
+    echo "thresholds of an earlier calibration: $thresholds (remove it to calibrate anew)" >&2
+  else
+    "$program" calibrate "${layers[@]}" --out "$out" --write "$thresholds"
+  fi
   layers+=(--config "$thresholds")
 fi
 

@@ -27,7 +27,7 @@ int run(int argc, char** argv) {
       "of quadrupeds,\nwith a verdict and a provenance for every one of them."};
   app.name("quadruped3d");
   app.require_subcommand(1);
-  app.set_version_flag("--version", "quadruped3d 0.1.0");
+  app.set_version_flag("--version", "quadruped3d " Q3D_VERSION);
   app.footer(
       "First steps:\n"
       "  quadruped3d sample --out data/world                 make pictures to try it on\n"

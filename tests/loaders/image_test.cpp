@@ -117,6 +117,19 @@ TEST(DecodeImage, flipped_bits_never_crash_and_png_notices_each) {
   }
 }
 
+TEST(DecodeImage, a_png_without_its_pixels_or_palette_is_damaged) {
+  // Chunks are the signature's 8 bytes, then length + 12 bytes each; these files have IHDR, [PLTE,] IDAT,
+  // IEND.
+  const std::vector<std::byte> rgb = bytes_of(fixture("rgb.png"));
+  std::vector<std::byte> no_pixels(rgb.begin(), rgb.begin() + 8 + 25);
+  no_pixels.insert(no_pixels.end(), rgb.end() - 12, rgb.end());
+  EXPECT_THAT(decode_image(no_pixels).detail, HasSubstr("no pixels"));
+  std::vector<std::byte> no_palette = bytes_of(fixture("palette.png"));
+  const auto palette_bytes = std::to_integer<std::ptrdiff_t>(no_palette[8 + 25 + 3]) + 12;
+  no_palette.erase(no_palette.begin() + 8 + 25, no_palette.begin() + 8 + 25 + palette_bytes);
+  EXPECT_THAT(decode_image(no_palette).detail, HasSubstr("no palette"));
+}
+
 TEST(DecodeImage, what_is_not_a_picture_is_named) {
   struct Case {
     std::string_view content;

@@ -5,6 +5,7 @@
 
 #include <fstream>
 #include <functional>
+#include <limits>
 #include <random>
 
 #include "manifests/atomic_file.h"
@@ -42,6 +43,13 @@ class HostileTable : public ::testing::Test {
   void expect_refused(const std::string& why) {
     EXPECT_THAT([&] { read_table(path_); },
                 ThrowsMessage<std::runtime_error>(AllOf(HasSubstr(path_.string()), HasSubstr(why))));
+  }
+  static void add_rows(hid_t file, std::int64_t rows) {
+    const hid_t space = H5Screate(H5S_SCALAR);
+    const hid_t attribute = H5Acreate2(file, "rows", H5T_STD_I64LE, space, H5P_DEFAULT, H5P_DEFAULT);
+    ASSERT_GE(H5Awrite(attribute, H5T_STD_I64LE, &rows), 0);
+    H5Aclose(attribute);
+    H5Sclose(space);
   }
   static void add(hid_t file, const char* name, hid_t type, std::vector<hsize_t> extents,
                   hid_t creation = H5P_DEFAULT, const void* data = nullptr) {
@@ -91,6 +99,24 @@ TEST_F(HostileTable, AbsurdExtents) {
   expect_refused("huge: ");
 }
 
+TEST_F(HostileTable, ARowThatOverflowsInATableWithoutRows) {
+  const hid_t file = H5Fcreate(path_.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+  add_rows(file, 0);
+  add(file, "wide_row", H5T_STD_U8LE, {0, hsize_t{1} << 40, hsize_t{1} << 40});
+  H5Fclose(file);
+  expect_refused("wide_row: an extent of 1099511627776 overflows");
+}
+
+TEST_F(HostileTable, AbsurdRows) {
+  for (const std::int64_t rows : {std::int64_t{-1}, std::numeric_limits<std::int64_t>::max()}) {
+    break_with([&](hid_t file) {
+      H5Adelete(file, "rows");
+      add_rows(file, rows);
+    });
+    expect_refused(rows < 0 ? "rows: got -1" : "expected 9223372036854775807");
+  }
+}
+
 TEST_F(HostileTable, AbsurdTextWidth) {
   break_with([&](hid_t file) {
     const hid_t type = H5Tcopy(H5T_C_S1);
@@ -126,7 +152,7 @@ TEST_F(HostileTable, OffsetsOfAnotherLengthTypeOrWithoutBytes) {
     H5Ldelete(file, "picture_offsets", H5P_DEFAULT);
     add(file, "picture_offsets", H5T_STD_I64LE, {4}, H5P_DEFAULT, zeros.data());
   });
-  expect_refused("picture_offsets: expected int64 (3)");
+  expect_refused("picture_offsets: expected 2 rows + 1 of int64");
   break_with([&](hid_t file) { H5Ldelete(file, "picture", H5P_DEFAULT); });
   expect_refused("picture_offsets: its bytes, dataset picture, are absent");
 }

@@ -44,7 +44,9 @@ model::PrimaConfig parity_config(const std::string& which) {
   return config;
 }
 
-model::Prima parity_prima(const std::string& which) { return parity_prima(which, parity_config(which)); }
+model::Prima parity_prima(const std::string& which) {
+  return parity_prima(which, parity_config(which));
+}
 
 model::Prima parity_prima(const std::string& which, const model::PrimaConfig& config) {
   model::configure_compute(1);  // a network this small only loses time to a second thread

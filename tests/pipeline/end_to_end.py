@@ -192,7 +192,8 @@ class EndToEnd(unittest.TestCase):
     def test_inspect_draws_and_describes(self):
         sheet = pathlib.Path(self.folder) / "sheet.png"
         run("inspect", self.scene.root / "out", "--sheet", sheet)
-        self.assertGreater(Image.open(sheet).size[0], 256)
+        with Image.open(sheet) as picture:
+            self.assertGreater(picture.size[0], 256)
         described = json.loads(run("inspect", self.dataset, "--json").stdout)
         self.assertEqual(described["counts"]["candidates"], PICTURES)
 
@@ -392,7 +393,7 @@ class EndToEnd(unittest.TestCase):
         content[start + 4 * 3 : start + 4 * 4] = struct.pack("<i", 5)  # joint 3 hangs on joint 5
         (self.scene.root / "cycle.safetensors").write_bytes(content)
         config = self.scene.write_config("cycle.json", network={"smal_asset": "cycle.safetensors"})
-        self.assertIn("parent", self.scene.build("cycle", config=config, expect=1).stderr)
+        self.assertIn("cycle above joint 3", self.scene.build("cycle", config=config, expect=1).stderr)
 
     def test_a_full_disk_is_named_and_loses_nothing(self):
         out = self.scene.root / "full"

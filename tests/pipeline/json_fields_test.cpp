@@ -73,7 +73,7 @@ TEST(JsonFields, MissingRequiredKeyAndWrongContainer) {
 }
 
 TEST(NearestWord, ByEditDistance) {
-  EXPECT_EQ(nearest_word("animal", {"prima", "superanimal", "coco"}), "superanimal");
+  EXPECT_EQ(nearest_word("superanmal", {"prima", "superanimal", "coco"}), "superanimal");
   EXPECT_EQ(nearest_word("anything", {}), "");
 }
 

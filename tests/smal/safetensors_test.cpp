@@ -6,6 +6,8 @@
 
 #include <cstring>
 #include <fstream>
+#include <random>
+#include <string_view>
 
 #include "tests/support/paths.h"
 
@@ -173,6 +175,34 @@ TEST_F(SafeTensorsFile, RefusesABoolThatIsNeitherZeroNorOne) {
   const auto file =
       SafeTensors::open(write(R"({"a":{"dtype":"BOOL","shape":[2],"data_offsets":[0,2]}})", "\x01\x02"));
   EXPECT_THROW(file.tensor("a"), std::runtime_error);
+}
+
+// Whatever the bytes, the file is either refused or every tensor of it can be read to the last element.
+TEST_F(SafeTensorsFile, RandomDamageIsRefusedOrReadable) {
+  const std::string header =
+      R"({"__metadata__":{"k":"v"},"a":{"dtype":"F32","shape":[2,3],"data_offsets":[0,24]},)"
+      R"("b":{"dtype":"I8","shape":[4],"data_offsets":[24,28]}})";
+  const std::string good = raw<std::uint64_t>({header.size()}) + header + std::string(28, '\1');
+  std::mt19937_64 random(41);
+  int refused = 0;
+  constexpr int kFiles = 400;
+  for (int i = 0; i < kFiles; ++i) {
+    std::string bytes = good;
+    for (std::uint64_t changes = 1 + random() % 3; changes > 0; --changes) {
+      constexpr std::string_view kAlphabet = "{}[]\",:0123456789FIU8\xff";
+      bytes[random() % (8 + header.size())] = kAlphabet[random() % kAlphabet.size()];
+    }
+    if (random() % 4 == 0) bytes.resize(random() % bytes.size());
+    const auto path = write_bytes(bytes);
+    try {
+      const auto file = SafeTensors::open(path);
+      for (const std::string& name : file.names()) file.tensor(name).to(torch::kFloat64).sum().item<double>();
+    } catch (const std::runtime_error&) {
+      ++refused;
+    }
+  }
+  EXPECT_GT(refused, kFiles / 2);
+  EXPECT_LT(refused, kFiles);
 }
 
 TEST_F(SafeTensorsFile, NamesAnAbsentTensor) {

@@ -9,7 +9,9 @@
 
 namespace q3d::testing {
 
-inline std::filesystem::path data_dir() { return Q3D_TEST_DATA_DIR; }
+inline std::filesystem::path data_dir() {
+  return Q3D_TEST_DATA_DIR;
+}
 
 // The golden numbers made with the official code: Q3D_PARITY_DIR, or the project's own copy.
 inline std::filesystem::path parity_dir() {
@@ -22,8 +24,8 @@ class ScratchDir {
  public:
   ScratchDir() {
     const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
-    path_ = std::filesystem::temp_directory_path() /
-            ("q3d_" + std::string(info->test_suite_name()) + "_" + info->name() + "_" + std::to_string(::getpid()));
+    path_ = std::filesystem::temp_directory_path() / ("q3d_" + std::string(info->test_suite_name()) + "_" +
+                                                      info->name() + "_" + std::to_string(::getpid()));
     std::filesystem::remove_all(path_);
     std::filesystem::create_directories(path_);
   }

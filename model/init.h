@@ -1,0 +1,21 @@
+// Seeded fresh weights, for tests, benchmarks and training from scratch.
+#pragma once
+
+#include <torch/torch.h>
+
+#include <cstdint>
+
+#include "model/checkpoint.h"
+#include "model/net.h"
+
+namespace q3d::model {
+
+// The initial float32 values of one tensor: a function of its name, its shape and the seed alone, and the
+// same bytes on every machine. Layer norms start at one and zero, init_pose at the identity, init_cam at the
+// official camera, biases at zero, matrices and embeddings uniform.
+torch::Tensor initial_tensor(const TensorSpec& spec, std::uint64_t seed);
+
+// Gives every parameter its initial values, in place.
+void initialise(PrimaNet& net, std::uint64_t seed);
+
+}  // namespace q3d::model

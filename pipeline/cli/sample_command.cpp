@@ -1,0 +1,68 @@
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include <cstdio>
+#include <memory>
+
+#include "pipeline/cli/commands.h"
+#include "pipeline/interrupt.h"
+#include "pipeline/progress.h"
+#include "pipeline/world/world.h"
+
+namespace q3d::pipeline::cli {
+namespace {
+
+struct Arguments {
+  world::WorldOptions world;
+  bool json = false;
+  bool quiet = false;
+};
+
+}  // namespace
+
+Command add_sample(CLI::App& app) {
+  auto arguments = std::make_shared<Arguments>();
+  world::WorldOptions& options = arguments->world;
+  CLI::App* command =
+      app.add_subcommand("sample", "render a world of quadrupeds with known truth, in native layouts");
+  command->add_option("-o,--out", options.out, "folder to make")->required();
+  command->add_option("--seed", options.seed, "the same seed gives the same bytes")->capture_default_str();
+  command->add_option("--share", options.share, "of the default number of pictures")->capture_default_str();
+  command->add_option("--pixels", options.picture_px, "longer side of a photograph")->capture_default_str();
+  command->add_option("-t,--threads", options.threads, "0 = all cores; never changes a byte")
+      ->capture_default_str();
+  command->add_flag("--json", arguments->json, "print a machine-readable summary on stdout");
+  command->add_flag("-q,--quiet", arguments->quiet, "no progress");
+  command->footer(
+      "Examples:\n"
+      "  quadruped3d sample --out data/world --share 0.08     a few hundred pictures\n"
+      "  quadruped3d sample --out data/world                  the whole world\n"
+      "Writes animal3d/, control_animal3dlatest/, superanimal_quadruped/ and animal_kingdom/ as their users "
+      "have them,\n"
+      "the hidden truth of the 2D-only sets in truth/, and the synthetic SMAL asset in assets/.");
+  return [arguments] {
+    world::WorldOptions& wanted = arguments->world;
+    std::unique_ptr<Progress> progress;
+    int shown = 0;
+    wanted.progress = [&](int done, int total) {
+      throw_if_interrupted();
+      if (!progress) progress = std::make_unique<Progress>("pictures", total, arguments->quiet);
+      progress->advance(done - shown);
+      shown = done;
+    };
+    const world::WorldSummary summary = world::make_world(wanted);
+    progress.reset();
+    for (const auto& [name, count] : summary.pictures) fmt::print(stderr, "  {:<28} {:>6}\n", name, count);
+    fmt::print(stderr, "{} pictures in {}{}\n", summary.total, wanted.out.string(),
+               summary.reused ? " (they were there already)" : "");
+    if (arguments->json) {
+      const nlohmann::ordered_json document = {
+          {"pictures", summary.pictures}, {"total", summary.total}, {"smal_asset", summary.asset.string()}};
+      fmt::print("{}\n", document.dump());
+    }
+    return 0;
+  };
+}
+
+}  // namespace q3d::pipeline::cli

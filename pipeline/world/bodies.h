@@ -1,0 +1,60 @@
+// The bodies of the world as plain arrays: the only part of the world that computes with LibTorch.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "pipeline/world/rays.h"
+
+namespace q3d::pipeline::world {
+
+inline constexpr int kBodyKeypoints = 26;
+inline constexpr int kBodyJoints = 35;
+inline constexpr int kBodyBetas = 41;
+
+// What the network is to find: SMAL's pose (axis-angle, rad; the first three are the global orientation) and
+// shape.
+struct Posture {
+  std::array<float, 3 * kBodyJoints> pose{};
+  std::array<float, kBodyBetas> betas{};
+};
+
+// A posed body, SMAL units, turned into the camera's frame but not moved: add the translation to see it.
+struct Body {
+  std::vector<Eigen::Vector3f> vertices;
+  std::array<Eigen::Vector3f, kBodyKeypoints> keypoints;
+};
+
+// The mesh at rest: x to the head, y up, z to the animal's right.
+struct RestMesh {
+  std::vector<Eigen::Vector3f> vertices;
+  std::vector<Triangle> triangles;
+  std::vector<std::array<float, kBodyJoints>> skinning;  // weights of each vertex, sum 1
+  std::array<std::vector<int>, kBodyKeypoints> keypoint_vertices;
+};
+
+class ShapeSpace;
+
+class BodyModel {
+ public:
+  BodyModel();  // the synthetic quadruped
+  ~BodyModel();
+  BodyModel(const BodyModel&) = delete;
+  BodyModel& operator=(const BodyModel&) = delete;
+
+  const RestMesh& rest() const;
+  const ShapeSpace& shapes() const;
+  void save(const std::filesystem::path& asset) const;  // throws std::runtime_error
+  // Bodies in the order of the postures. The numbers do not depend on the number of threads.
+  std::vector<Body> pose(std::span<const Posture> postures) const;
+
+ private:
+  struct Model;
+  std::unique_ptr<const Model> model_;
+};
+
+}  // namespace q3d::pipeline::world

@@ -1,0 +1,23 @@
+// What stands between the camera and the animal.
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <span>
+
+#include "pipeline/world/backdrop.h"
+#include "pipeline/world/random.h"
+#include "pipeline/world/scene.h"
+
+namespace q3d::pipeline::world {
+
+// Paints one occluder (a branch, a trunk or post, tall grass, a stone, bars, or something close and blurred)
+// over a part of the box that the animal fills, and adds to `cover` (255 = hidden by an occluder).
+void paint_occluder(cv::Mat& picture, cv::Mat1b& cover, const cv::Rect& animal_px, const Backdrop& backdrop,
+                    Rng& rng);
+
+// Grass in front of the feet: blades that start at the vertices nearest the ground. Too thin to hide
+// anything.
+void paint_grass_at_feet(cv::Mat& picture, const Backdrop& backdrop, const PictureCamera& camera,
+                         const Ground& ground, std::span<const Eigen::Vector3f> vertices, Rng& rng);
+
+}  // namespace q3d::pipeline::world

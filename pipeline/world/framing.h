@@ -1,0 +1,41 @@
+// Where the animal stands in the picture, the annotator's box around it, and the camera that follows.
+//
+// The network's crop camera has focal 1000 px for a crop scaled to 256 px and its principal point in the
+// crop's centre. A picture is therefore rendered with that very camera, carried to its own pixels: focal 1000
+// * side / 256 px, principal point in the (floored) centre of the annotated box. It is a part of a larger
+// sensor's picture, so to say. The translation that goes with it is then exact.
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <span>
+
+#include "pipeline/world/random.h"
+#include "pipeline/world/scene.h"
+
+namespace q3d::pipeline::world {
+
+// How one dataset frames its animals.
+struct FramingHabits {
+  double fill_low = 0.5, fill_high = 0.9;  // longer side of the animal, share of the picture's shorter side
+  double truncated = 0.1;                  // share of pictures in which the animal runs out of the picture
+  double box_bias = 1.02, box_spread = 0.02;  // box side over silhouette side: mean and deviation
+};
+
+struct Framing {
+  cv::Rect box;  // pixels, as a person draws it: not always tight, never outside the picture
+  PictureCamera camera;
+  Eigen::Vector3f translation{0.0F, 0.0F, 0.0F};
+};
+
+// The camera that belongs to a box (see the note above). Throws std::invalid_argument on an empty box.
+PictureCamera camera_of_box(const cv::Rect& box);
+
+// The translation with which the projected vertices have their bounding box's centre at `centre_px` and its
+// longer side equal to `side_px`.
+Eigen::Vector3f fit_translation(std::span<const Eigen::Vector3f> vertices, const PictureCamera& camera,
+                                const cv::Point2d& centre_px, double side_px);
+
+Framing frame_animal(std::span<const Eigen::Vector3f> vertices, cv::Size picture_px,
+                     const FramingHabits& habits, Rng& rng);
+
+}  // namespace q3d::pipeline::world

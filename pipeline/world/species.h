@@ -1,0 +1,49 @@
+// The animals of the world: regions of shape space with their coats and how often each dataset shows them.
+#pragma once
+
+#include <array>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "pipeline/world/coat.h"
+
+namespace q3d::pipeline::world {
+
+enum class Family : int { felidae, canidae, equidae, bovidae, hippopotamidae };
+inline constexpr int kFamilies = 5;
+std::string_view to_string(Family family);
+
+// How a species differs from the centre of its family: relative changes of lengths, 0.1 = a tenth more.
+struct Build {
+  float legs = 0.0F;   // elbow and stifle to the ground
+  float neck = 0.0F;   // withers to the head
+  float girth = 0.0F;  // back to belly, side to side
+  float head = 0.0F;   // eyes to nose
+  float ears = 0.0F;
+  float tail = 0.0F;
+};
+
+// Relative frequency in each dataset; 0 = does not occur.
+struct Frequency {
+  double animal3d = 0.0, ctrlani3d = 0.0, superanimal = 0.0, animal_kingdom = 0.0;
+};
+
+struct Species {
+  std::string_view name;  // lower case, spaces
+  Family family;
+  std::string_view synset;        // WordNet number, the first part of an ImageNet file name
+  std::string_view kingdom_name;  // what Animal Kingdom calls it, and the group it puts it in
+  std::string_view kingdom_group;
+  Frequency frequency;
+  Build build;
+  std::vector<Coat> coats;  // variants, equally frequent
+};
+
+std::span<const Species> species_table();
+
+// An individual's coat: one of the species' variants with its own shade.
+Coat draw_coat(const Species& species, Rng& rng);
+
+}  // namespace q3d::pipeline::world

@@ -1,0 +1,28 @@
+// Poses: what the animal is doing, from standing to the rare extremes.
+#pragma once
+
+#include <array>
+
+#include "pipeline/world/bodies.h"
+#include "pipeline/world/random.h"
+
+namespace q3d::pipeline::world {
+
+struct Stance {
+  std::array<float, 3 * kBodyJoints> pose{};  // axis-angle, rad; the first three stay zero
+  double pitch = 0.0;                         // of the whole body, rad: nose up
+  double roll = 0.0;                          // rad: the back turns towards the animal's right
+  double lift = 0.0;                          // of the lowest point over the ground, SMAL units
+};
+
+struct StanceHabits {
+  double extreme = 0.04;  // share of rearing, leaping, rolling, stretching animals
+  double resting = 0.12;  // share of sitting and lying ones
+  double spread = 1.0;    // scales the other poses' distance from the mean pose
+};
+
+// Most animals stand, walk, run, graze or crouch: poses from the synthetic pose prior, within the ranges of
+// the joints. The resting and the extreme ones are postures of their own, which the prior finds unlikely.
+Stance draw_stance(const StanceHabits& habits, Rng& rng);
+
+}  // namespace q3d::pipeline::world

@@ -1,0 +1,23 @@
+// One animal before the camera: who it is, what it does and how it is turned.
+#pragma once
+
+#include "pipeline/world/bodies.h"
+#include "pipeline/world/domain.h"
+#include "pipeline/world/shape_space.h"
+
+namespace q3d::pipeline::world {
+
+struct Subject {
+  Posture posture;  // with the global orientation
+  Coat coat;
+  Eigen::Vector3f individual{0.0F, 0.0F, 0.0F};  // shifts the coat's pattern
+  Eigen::Vector3f up{0.0F, -1.0F, 0.0F};         // the world's upward direction in the camera's frame
+  double lift = 0.0;                             // of the feet over the ground, SMAL units
+  Place place = Place::meadow;
+};
+
+// `who` decides individual, coat and place, `when` decides pose and view: frames of one film share the first.
+Subject draw_subject(const Species& species, const Domain& domain, const ShapeSpace& shapes, Rng& who,
+                     Rng& when);
+
+}  // namespace q3d::pipeline::world

@@ -1,0 +1,32 @@
+// The collections that make up SuperAnimal-Quadruped: each labels its own part of the 39 keypoints and has
+// its own habits of naming, boxes and codes for a missing point.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "pipeline/world/random.h"
+#include "pipeline/world/species.h"
+
+namespace q3d::pipeline::world {
+
+struct SuperAnimalSource {
+  std::string_view name;         // of the collection, as in "source_dataset"
+  std::vector<int> covers;       // which of the 39 it has; the others are -1, -1, -1
+  bool missing_is_zero = false;  // a point of its own that is not labelled: 0, 0, 0 instead of -1, -1, -1
+  int labelled_v = 2;
+  bool keypoint_box = false;  // no box of its own: made from the keypoints, 20 px wider, cut at 0 only
+};
+
+std::span<const SuperAnimalSource> superanimal_sources();
+
+// Row of superanimal_sources() for one more picture of a species.
+int draw_source(const Species& species, Rng& rng);
+
+// The file's name as the collection and SuperAnimal's converter make it: "<stem>_<image id>.jpg"; for some
+// collections with the folder, even the whole path, of the machine that converted it.
+std::string source_file_name(int source, const Species& species, int image_id, Rng& rng);
+
+}  // namespace q3d::pipeline::world

@@ -1,0 +1,241 @@
+// The rules of test-time adaptation, on the network and the samples of fixture A. Its numbers are checked in
+// tta_parity_test.cpp.
+#include "model/tta.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "model/net.h"
+#include "tests/model/parity_net.h"
+
+namespace q3d::model {
+namespace {
+
+constexpr double kBatchNoise = 2e-4;  // of rotations, after some steps at a large rate
+
+struct Samples {
+  Prima prima = testing::parity_prima("A");
+  smal::SafeTensors file = testing::parity_file("tta_A");
+  ImageFeatures features = prima.encode(testing::parity_images(prima, file.tensor("input_index")));
+  torch::Tensor keypoints = file.tensor("gt_keypoints").clone();
+};
+
+class Tta : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() { samples_ = new Samples; }
+  static void TearDownTestSuite() { delete samples_; }
+
+  static TtaOptions fast() {
+    TtaOptions options;
+    options.learning_rate = 1e-3;
+    return options;
+  }
+
+  static TtaSchedule steps(int iterations) {
+    TtaSchedule schedule;
+    schedule.iterations = iterations;
+    return schedule;
+  }
+
+  static std::vector<TtaSchedule> all(const TtaSchedule& schedule) {
+    return std::vector<TtaSchedule>(static_cast<std::size_t>(samples_->keypoints.size(0)), schedule);
+  }
+
+  static TtaResult run(const torch::Tensor& keypoints, const std::vector<TtaSchedule>& schedules) {
+    return adapt(samples_->prima, samples_->features, keypoints, schedules, fast());
+  }
+
+  static void expect_near(const torch::Tensor& a, const torch::Tensor& b, double tolerance) {
+    ASSERT_EQ(a.sizes(), b.sizes());
+    EXPECT_LE((a - b).abs().max().item<double>(), tolerance);
+  }
+
+  static inline Samples* samples_ = nullptr;
+};
+
+TEST_F(Tta, IterateZeroIsThePrediction) {
+  const Prediction before = samples_->prima.predict(samples_->features);
+  const TtaResult result = run(samples_->keypoints, all(steps(0)));
+  expect_near(result.best.rotations, before.rotations, 1e-5);
+  expect_near(result.last.keypoints_2d, before.keypoints_2d, 1e-5);
+  const torch::Tensor visible = samples_->keypoints.select(2, 2) > 0;
+  const torch::Tensor error = (before.keypoints_2d - samples_->keypoints.narrow(2, 0, 2)).abs().sum(2);
+  for (std::int64_t i = 0; i < visible.size(0); ++i) {
+    const auto index = static_cast<std::size_t>(i);
+    ASSERT_EQ(result.l_proj[index].size(), 1U);
+    const double by_hand = error[i].masked_select(visible[i]).mean().item<double>() / 2.0;
+    EXPECT_NEAR(result.l_proj[index][0], by_hand, 1e-6);
+    EXPECT_EQ(result.best_iteration[index], 0);
+  }
+}
+
+TEST_F(Tta, KeepsTheBestIterate) {
+  const TtaResult result = run(samples_->keypoints, all(steps(12)));
+  for (std::size_t i = 0; i < result.l_proj.size(); ++i) {
+    const auto& curve = result.l_proj[i];
+    ASSERT_EQ(curve.size(), 13U);
+    ASSERT_EQ(result.loss[i].size(), 13U);
+    const auto least = std::min_element(curve.begin(), curve.end());
+    EXPECT_EQ(result.best_iteration[i], least - curve.begin());
+    const auto row = static_cast<std::int64_t>(i);
+    const torch::Tensor keypoints = samples_->keypoints[row];
+    const torch::Tensor visible = keypoints.select(1, 2) > 0;
+    const torch::Tensor error = (result.best.keypoints_2d[row] - keypoints.narrow(1, 0, 2)).abs().sum(1);
+    EXPECT_NEAR(error.masked_select(visible).mean().item<double>() / 2.0, *least, 1e-6);
+  }
+}
+
+// Four lengths in one batch, so slots are emptied and refilled; each as if it had run alone.
+TEST_F(Tta, InstancesDoNotFeelTheirBatchMates) {
+  const std::vector<TtaSchedule> schedules{steps(3), steps(12), steps(0), steps(7)};
+  const TtaResult together = run(samples_->keypoints, schedules);
+  for (std::int64_t i = 0; i < 4; ++i) {
+    const auto index = static_cast<std::size_t>(i);
+    const ImageFeatures features{samples_->features.image_tokens.narrow(0, i, 1),
+                                 samples_->features.bio_token.narrow(0, i, 1)};
+    const TtaResult alone =
+        adapt(samples_->prima, features, samples_->keypoints.narrow(0, i, 1), {schedules[index]}, fast());
+    ASSERT_EQ(together.l_proj[index].size(), static_cast<std::size_t>(schedules[index].iterations) + 1);
+    ASSERT_EQ(alone.l_proj[0].size(), together.l_proj[index].size());
+    for (std::size_t step = 0; step < alone.l_proj[0].size(); ++step) {
+      EXPECT_NEAR(alone.l_proj[0][step], together.l_proj[index][step], 1e-5);
+      EXPECT_NEAR(alone.loss[0][step], together.loss[index][step], 1e-4);
+    }
+    expect_near(alone.last.rotations[0], together.last.rotations[i], kBatchNoise);
+    expect_near(alone.last.betas[0], together.last.betas[i], kBatchNoise);
+    expect_near(alone.best.keypoints_2d[0], together.best.keypoints_2d[i], kBatchNoise);
+  }
+}
+
+TEST_F(Tta, StopsBelowTheThreshold) {
+  const TtaResult free = run(samples_->keypoints, all(steps(12)));
+  std::vector<TtaSchedule> schedules = all(steps(12));
+  for (std::size_t i = 0; i < schedules.size(); ++i) {
+    // Between the first iterate and the best one, or never reached where nothing improves.
+    const double least = *std::min_element(free.l_proj[i].begin(), free.l_proj[i].end());
+    schedules[i].stop_below = 0.5 * (free.l_proj[i][0] + least);
+  }
+  const TtaResult stopped = run(samples_->keypoints, schedules);
+  for (std::size_t i = 0; i < schedules.size(); ++i) {
+    const auto& curve = free.l_proj[i];
+    const auto below = std::find_if(curve.begin(), curve.end(),
+                                    [&](double value) { return value < schedules[i].stop_below; });
+    const auto expected = std::min<std::ptrdiff_t>(below - curve.begin() + 1, 13);
+    EXPECT_EQ(static_cast<std::ptrdiff_t>(stopped.l_proj[i].size()), expected) << i;
+  }
+}
+
+TEST_F(Tta, StopsAtOnceWhenAlreadyBelow) {
+  TtaSchedule schedule = steps(12);
+  schedule.stop_below = 10.0;
+  for (const auto& curve : run(samples_->keypoints, all(schedule)).l_proj) EXPECT_EQ(curve.size(), 1U);
+}
+
+TEST_F(Tta, GivesUpWithoutGain) {
+  TtaSchedule schedule = steps(12);
+  schedule.gain_window = 4;
+  schedule.min_gain = 0.999;
+  for (const auto& curve : run(samples_->keypoints, all(schedule)).l_proj) EXPECT_EQ(curve.size(), 5U);
+  schedule.min_gain = 1e-9;
+  const TtaResult kept = run(samples_->keypoints, all(schedule));
+  for (const auto& curve : kept.l_proj) {
+    const double least = *std::min_element(curve.begin() + 1, curve.begin() + 5);
+    EXPECT_EQ(curve.size(), least < curve[0] ? 13U : 5U);
+  }
+}
+
+TEST_F(Tta, NothingVisibleLeavesTheInstanceAlone) {
+  const Prediction before = samples_->prima.predict(samples_->features);
+  torch::Tensor keypoints = samples_->keypoints.clone();
+  keypoints[1].select(1, 2).fill_(0.0);
+  const TtaResult result = run(keypoints, all(steps(5)));
+  EXPECT_TRUE(result.l_proj[1].empty());
+  EXPECT_TRUE(result.loss[1].empty());
+  EXPECT_EQ(result.best_iteration[1], 0);
+  expect_near(result.last.rotations[1], before.rotations[1], 1e-5);
+  EXPECT_EQ(result.l_proj[0].size(), 6U);
+  EXPECT_GT((result.last.rotations[0] - before.rotations[0]).abs().max().item<double>(), 1e-4);
+}
+
+TEST_F(Tta, WeightsSayVisibleAndNothingMore) {
+  torch::Tensor heavier = samples_->keypoints.clone();
+  heavier.select(2, 2).mul_(2.0);
+  const TtaResult once = run(samples_->keypoints, all(steps(3)));
+  const TtaResult twice = run(heavier, all(steps(3)));
+  EXPECT_EQ(once.loss, twice.loss);
+}
+
+TEST_F(Tta, GarbageInInvisiblePointsIsIgnored) {
+  torch::Tensor keypoints = samples_->keypoints.clone();
+  const torch::Tensor hidden = keypoints.select(2, 2) <= 0;
+  ASSERT_TRUE(hidden.any().item<bool>());
+  keypoints.narrow(2, 0, 2).masked_fill_(hidden.unsqueeze(2), std::numeric_limits<float>::quiet_NaN());
+  EXPECT_EQ(run(keypoints, all(steps(3))).loss, run(samples_->keypoints, all(steps(3))).loss);
+}
+
+TEST_F(Tta, NonFiniteTargetsTouchNoOtherInstance) {
+  const TtaResult clean = run(samples_->keypoints, all(steps(4)));
+  torch::Tensor keypoints = samples_->keypoints.clone();
+  keypoints[0][0][0] = std::numeric_limits<float>::quiet_NaN();
+  keypoints[0][0][2] = 1.0;
+  const TtaResult result = run(keypoints, all(steps(4)));
+  EXPECT_TRUE(result.l_proj[0].empty());
+  EXPECT_TRUE(result.last.rotations.isfinite().all().item<bool>());
+  for (std::size_t i = 1; i < 4; ++i) {
+    ASSERT_EQ(result.l_proj[i].size(), 5U);
+    EXPECT_NEAR(result.l_proj[i].back(), clean.l_proj[i].back(), 1e-5);
+  }
+}
+
+TEST_F(Tta, ExplodingStepsKeepTheLastFiniteIterate) {
+  TtaOptions wild = fast();
+  wild.learning_rate = 1e30;
+  const Prediction before = samples_->prima.predict(samples_->features);
+  const TtaResult result =
+      adapt(samples_->prima, samples_->features, samples_->keypoints, all(steps(6)), wild);
+  for (std::size_t i = 0; i < 4; ++i) {
+    ASSERT_GE(result.l_proj[i].size(), 1U);
+    EXPECT_LT(result.l_proj[i].size(), 7U) << "nothing exploded";
+    for (const double value : result.l_proj[i]) EXPECT_TRUE(std::isfinite(value));
+    for (const double value : result.loss[i]) EXPECT_TRUE(std::isfinite(value));
+  }
+  for (const Prediction* kept : {&result.best, &result.last}) {
+    EXPECT_TRUE(kept->rotations.isfinite().all().item<bool>());
+    EXPECT_TRUE(kept->betas.isfinite().all().item<bool>());
+    EXPECT_TRUE(kept->keypoints_2d.isfinite().all().item<bool>());
+  }
+  expect_near(result.best.rotations, before.rotations, 1e-5);
+}
+
+TEST_F(Tta, LeavesTheNetworkAsItWas) {
+  std::vector<torch::Tensor> before;
+  for (const auto& parameter : samples_->prima.net().parameters()) before.push_back(parameter.clone());
+  run(samples_->keypoints, all(steps(3)));
+  const auto after = samples_->prima.net().parameters();
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    EXPECT_TRUE(torch::equal(before[i], after[i]));
+    EXPECT_FALSE(after[i].grad().defined());
+  }
+}
+
+TEST_F(Tta, WrongArgumentsAreRefused) {
+  const torch::Tensor& keypoints = samples_->keypoints;
+  EXPECT_THROW(run(keypoints.narrow(1, 0, 25), all(steps(1))), std::invalid_argument);
+  EXPECT_THROW(run(keypoints.narrow(0, 0, 3), all(steps(1))), std::invalid_argument);
+  EXPECT_THROW(run(keypoints, {steps(1)}), std::invalid_argument);
+  EXPECT_THROW(run(keypoints, all(steps(-1))), std::invalid_argument);
+  TtaOptions options = fast();
+  options.learning_rate = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW(adapt(samples_->prima, samples_->features, keypoints, all(steps(1)), options),
+               std::invalid_argument);
+  samples_->prima.net().train();
+  EXPECT_THROW(run(keypoints, all(steps(1))), std::invalid_argument);
+  samples_->prima.net().eval();
+}
+
+}  // namespace
+}  // namespace q3d::model

@@ -1,0 +1,185 @@
+"""The stack machine behind restricted_pickle.py, without its side effects: objects are made as records."""
+
+from __future__ import annotations
+
+from typing import Callable, Optional
+
+from pickle_names import BrokenPickle, Global, RefusedPickle, is_class_name, makes_values
+
+
+class Record:
+    """An object of a class that was not imported."""
+
+    __slots__ = ("cls", "args", "state", "entries", "elements")
+
+    def __init__(self, cls: Global, args: tuple):
+        self.cls = cls
+        self.args = args  # what its constructor, or __new__, would have got
+        self.state = None  # what __setstate__ would have got
+        self.entries: dict = {}  # the items of a dict's subclass
+        self.elements: list = []  # the items of a list's or set's subclass
+
+    @property
+    def path(self) -> str:
+        return self.cls.path
+
+    def __repr__(self) -> str:
+        return f"<{self.path}>"
+
+
+class Machine:
+    """A stack, marks on it, and a memo: the pickle language without its side effects."""
+
+    def __init__(self, data: memoryview, persistent: Optional[Callable[[object], object]]):
+        self.data = data
+        self.persistent = persistent
+        self.position = 0
+        self.opcode_at = 0
+        self.stack: list = []
+        self.marks: list[int] = []
+        self.memo: dict[int, object] = {}
+        self.stopped = False
+
+    def result(self):
+        """The one object that is left at the end."""
+        value = self.pop()
+        if self.stack or self.marks:
+            raise BrokenPickle("the pickle ends with unused objects on its stack")
+        if self.position != len(self.data):
+            raise BrokenPickle(f"{len(self.data) - self.position} bytes follow the end of the pickle")
+        return value
+
+    # Input.
+
+    def take(self, count: int) -> memoryview:
+        left = len(self.data) - self.position
+        if count > left:
+            raise BrokenPickle(f"the file ends early: {count} bytes expected, {left} left")
+        self.position += count
+        return self.data[self.position - count : self.position]
+
+    def unsigned(self, width: int) -> int:
+        return int.from_bytes(self.take(width), "little")
+
+    def line(self) -> bytes:
+        start = self.position
+        step = 4096
+        while True:
+            chunk = bytes(self.data[self.position : self.position + step])
+            if not chunk:
+                raise BrokenPickle("the file ends early: inside a line of text")
+            end = chunk.find(b"\n")
+            if end >= 0:
+                self.position += end + 1
+                return bytes(self.data[start : self.position - 1])
+            self.position += len(chunk)
+            step = min(2 * step, 1 << 24)
+
+    def text_line(self) -> str:
+        return decode(self.line(), "ascii")
+
+    # The stack.
+
+    def push(self, value) -> None:
+        self.stack.append(value)
+
+    def pop(self):
+        if len(self.stack) <= (self.marks[-1] if self.marks else 0):
+            raise BrokenPickle("takes an object from an empty stack")
+        return self.stack.pop()
+
+    def top(self):
+        value = self.pop()
+        self.push(value)
+        return value
+
+    def pop_mark(self) -> list:
+        if not self.marks:
+            raise BrokenPickle("takes objects up to a mark that is not there")
+        start = self.marks.pop()
+        values = self.stack[start:]
+        del self.stack[start:]
+        return values
+
+    def remember(self, index: int) -> None:
+        if not 0 <= index < 1 << 32:
+            raise BrokenPickle(f"stores an object under the number {index}")
+        self.memo[index] = self.top()
+
+    def recall(self, index: int) -> None:
+        if index not in self.memo:
+            raise BrokenPickle(f"recalls object {index}, which was never stored")
+        self.push(self.memo[index])
+
+    # Objects.
+
+    def call(self, target, args) -> Record:
+        """What a call would make, as a record. Refuses what looks like a function instead of a class."""
+        if not isinstance(target, Global):
+            raise RefusedPickle(f"calls {short(target)}, which is no class")
+        if not isinstance(args, tuple):
+            raise RefusedPickle(f"calls {target.path} with {short(args)} in the place of arguments")
+        match target.path, args:
+            case "copyreg._reconstructor", (Global() as cls, Global() as base, content):  # protocols 0 and 1
+                return Record(cls, () if base.path == "builtins.object" else (content,))
+            case "copyreg.__newobj__", (Global() as cls, *rest):
+                return Record(cls, tuple(rest))
+            case "builtins.getattr", (Global() as enum, str() as member) if is_class_name(enum.name):
+                return Record(enum, (member,))  # how Python 3.11 makes a member of an Enum
+        if not makes_values(target):
+            raise RefusedPickle(f"calls {target.path}, which is unknown and does not look like a class")
+        return Record(target, args)
+
+    def build(self, target, state) -> None:
+        if not isinstance(target, Record):
+            raise RefusedPickle(f"sets the state of {short(target)}, which takes none")
+        if target.state is not None:
+            raise RefusedPickle(f"sets the state of one {target.path} twice")
+        target.state = state
+
+    def set_items(self, target, values: list) -> None:
+        if len(values) % 2:
+            raise BrokenPickle("sets a key that has no value")
+        entries = target.entries if isinstance(target, Record) else target
+        if not isinstance(entries, dict):
+            raise RefusedPickle(f"sets items of {short(target)}, which has none")
+        for key, value in zip(values[::2], values[1::2]):
+            entries[checked_key(key)] = value
+
+    def append(self, target, values: list) -> None:
+        elements = target.elements if isinstance(target, Record) else target
+        if not isinstance(elements, list):
+            raise RefusedPickle(f"appends to {short(target)}, which is no list")
+        elements.extend(values)
+
+    def identify(self, identity) -> None:
+        if self.persistent is None:
+            raise RefusedPickle("names an object outside the file (a persistent id)")
+        self.push(self.persistent(identity))
+
+
+def checked_key(key):
+    """Keys are hashed, and hashing runs on nested keys without a limit, so they have to be flat."""
+    scalars = (str, bytes, bool, float, type(None), Global, Record)
+    for part in key if isinstance(key, tuple) else (key,):
+        # Large integers with equal remainders would all fall into one bucket.
+        if not isinstance(part, scalars) and not (isinstance(part, int) and abs(part) < 1 << 60):
+            raise RefusedPickle(f"{short(part)} as the key of a dict or the member of a set")
+    return key
+
+
+def decode(raw: bytes, encoding: str) -> str:
+    try:
+        return raw.decode(encoding, "surrogatepass" if encoding == "utf-8" else "strict")
+    except UnicodeDecodeError:
+        raise BrokenPickle(f"text that is not {encoding}: {short(raw)}") from None
+
+
+def short(value: object) -> str:
+    """A bounded description for messages."""
+    if isinstance(value, (str, bytes)):
+        text = repr(value[:60])
+        return text if len(value) <= 60 else text + "..."
+    if isinstance(value, (Global, Record)):
+        return value.path
+    return f"a {type(value).__name__}"

@@ -1,0 +1,168 @@
+"""Turns records of numpy, chumpy and scipy objects (see restricted_pickle.py) into numpy arrays.
+
+Every size is checked against the bytes that are there before an array is made.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+
+import numpy as np
+
+from restricted_pickle import BrokenPickle, Global, Record
+
+# Official SMAL tables have at most 3.6 million numbers. A sparse matrix names any shape in a few bytes.
+MAX_DENSE_ELEMENTS = 1 << 26
+
+_NUMPY_MAKERS = re.compile(r"numpy\.(_?core)\.(multiarray|numeric)\.(_reconstruct|_frombuffer|scalar)")
+_SPARSE_CLASS = re.compile(r"scipy\.sparse\.(\w+\.)*(csc|csr|coo)_(matrix|array)")
+_PLAIN_DTYPE = re.compile(r"[<>|=]?(b1|[iu][1248]|f[248])")
+
+
+def array(value, what: str) -> np.ndarray:
+    """The array that `value` stands for: a numpy array or scalar, a chumpy array that stores its numbers, a number,
+    or a (nested) list of these with equal shapes. Throws BrokenPickle naming `what`."""
+    if isinstance(value, Record):
+        if value.path == "chumpy.ch.Ch":
+            return array(_chumpy_numbers(value, what), what)
+        maker = _NUMPY_MAKERS.fullmatch(value.path)
+        if maker is None:
+            raise BrokenPickle(f"{what} is a {value.path}, expected an array")
+        return {"_reconstruct": _reconstructed, "_frombuffer": _from_buffer, "scalar": _scalar}[maker[3]](value, what)
+    if isinstance(value, bool) or not isinstance(value, (int, float, list, tuple)):
+        raise BrokenPickle(f"{what} is a {type(value).__name__}, expected an array")
+    try:
+        if isinstance(value, (int, float)):
+            return np.asarray(value, np.float64 if isinstance(value, float) else np.int64)
+        return np.stack([array(item, f"{what}[{i}]") for i, item in enumerate(value)])
+    except (ValueError, OverflowError, RecursionError) as error:
+        raise BrokenPickle(f"{what} is no rectangular table of numbers: {error}") from None
+
+
+def matrix(value, what: str) -> np.ndarray:
+    """As array(), and scipy's csc, csr and coo matrices too, filled out with zeros. Repeated entries add up."""
+    if isinstance(value, Record) and _SPARSE_CLASS.fullmatch(value.path):
+        return _dense(value, what)
+    return array(value, what)
+
+
+def _chumpy_numbers(record: Record, what: str):
+    """chumpy keeps the numbers of a plain array in `x`; an array computed from others has none."""
+    state = record.state if isinstance(record.state, dict) else {}
+    if "x" not in state:
+        raise BrokenPickle(f"{what} is a chumpy array without stored numbers (no 'x' in its state)")
+    return state["x"]
+
+
+# --- numpy ---------------------------------------------------------------------------------------------------------
+
+
+def _dtype(value, what: str) -> np.dtype:
+    """numpy writes a dtype as dtype('f8', align, copy), then its state (version, byte order, ...)."""
+    if not isinstance(value, Record) or value.path != "numpy.dtype" or not value.args:
+        raise BrokenPickle(f"{what} has no numpy dtype")
+    code = value.args[0]
+    if not isinstance(code, str) or not _PLAIN_DTYPE.fullmatch(code):
+        raise BrokenPickle(f"{what} has dtype {str(code)[:20]!r}, expected plain numbers (b1, i1..i8, u1..u8, f2..f8)")
+    order = value.state[1] if isinstance(value.state, tuple) and len(value.state) > 1 else None
+    return np.dtype(code).newbyteorder(order) if order in ("<", ">") else np.dtype(code)
+
+
+def _bytes(value, what: str) -> bytes:
+    """Raw numbers: bytes, a Python 2 string, or, from Python 3 in protocol 2, encode(text, 'latin1') and bytes()."""
+    if isinstance(value, Record) and value.path == "builtins.bytes" and value.args == ():
+        return b""
+    if isinstance(value, Record) and value.path in ("_codecs.encode", "codecs.encode") and len(value.args) == 2:
+        text, encoding = value.args
+        if isinstance(text, str) and encoding in ("latin1", "latin-1"):
+            value = text
+    if isinstance(value, str):
+        try:
+            return value.encode("latin-1")
+        except UnicodeEncodeError:
+            pass
+    if not isinstance(value, bytes):
+        raise BrokenPickle(f"{what} holds a {type(value).__name__}, expected the bytes of its numbers")
+    return value
+
+
+def _shaped(raw: bytes, dtype: np.dtype, shape, fortran: bool, what: str) -> np.ndarray:
+    if not isinstance(shape, tuple) or not all(type(size) is int and size >= 0 for size in shape) or len(shape) > 8:
+        raise BrokenPickle(f"{what} has the shape {str(shape)[:60]}, expected up to 8 sizes")
+    expected = math.prod(shape) * dtype.itemsize
+    if len(raw) != expected:
+        raise BrokenPickle(f"{what} has {len(raw)} bytes, expected {expected} for {list(shape)} {dtype}")
+    return np.frombuffer(raw, dtype).reshape(shape, order="F" if fortran else "C")
+
+
+def _reconstructed(record: Record, what: str) -> np.ndarray:
+    """An empty array and then its state: ([version,] shape, dtype, is_fortran, bytes)."""
+    cls = record.args[0] if record.args else None
+    state = record.state
+    if cls != Global("numpy", "ndarray") or not isinstance(state, tuple) or len(state) not in (4, 5):
+        raise BrokenPickle(f"{what} is no complete numpy array")
+    shape, described, fortran, raw = state[-4:]
+    dtype = _dtype(described, what)
+    return _shaped(_bytes(raw, what), dtype, shape, bool(fortran), what)
+
+
+def _from_buffer(record: Record, what: str) -> np.ndarray:
+    if len(record.args) != 4:
+        raise BrokenPickle(f"{what} is no complete numpy array")
+    raw, dtype, shape, order = record.args
+    return _shaped(_bytes(raw, what), _dtype(dtype, what), shape, order == "F", what)
+
+
+def _scalar(record: Record, what: str) -> np.ndarray:
+    if len(record.args) != 2:
+        raise BrokenPickle(f"{what} is no complete numpy number")
+    return _shaped(_bytes(record.args[1], what), _dtype(record.args[0], what), (), False, what)
+
+
+# --- scipy ---------------------------------------------------------------------------------------------------------
+
+
+def _dense(record: Record, what: str) -> np.ndarray:
+    state = record.state if isinstance(record.state, dict) else {}
+
+    def part(name: str) -> np.ndarray:
+        if name not in state:
+            raise BrokenPickle(f"{what} is a {record.path} without '{name}'")
+        numbers = array(state[name], f"{what}.{name}")
+        if numbers.ndim != 1:
+            raise BrokenPickle(f"{what}.{name} has {numbers.ndim} axes, expected 1")
+        return numbers
+
+    shape = state.get("_shape", state.get("shape"))
+    shape = tuple(int(array(size, f"{what}.shape")) for size in shape) if isinstance(shape, (tuple, list)) else ()
+    if len(shape) != 2 or min(shape) < 1 or math.prod(shape) > MAX_DENSE_ELEMENTS:
+        raise BrokenPickle(f"{what} has the shape {shape}, expected two sizes, at most {MAX_DENSE_ELEMENTS} numbers")
+    values = part("data")
+    kind = _SPARSE_CLASS.fullmatch(record.path)[2]
+    if kind == "coo":
+        rows, columns = part("row"), part("col")
+    else:
+        majors = shape[1] if kind == "csc" else shape[0]
+        rows, columns = _expand(part("indptr"), part("indices"), majors, len(values), what)
+        if kind == "csc":
+            rows, columns = columns, rows
+    for name, index, size in (("row", rows, shape[0]), ("column", columns, shape[1])):
+        if len(index) != len(values) or index.dtype.kind not in "iu" or (len(index) and not _inside(index, size)):
+            raise BrokenPickle(f"{what} has a {name} index outside 0 to {size - 1}, or too few of them")
+    dense = np.zeros(shape, values.dtype)
+    np.add.at(dense, (rows.astype(np.int64), columns.astype(np.int64)), values)
+    return dense
+
+
+def _inside(index: np.ndarray, size: int) -> bool:
+    return bool(index.min() >= 0 and index.max() < size)
+
+
+def _expand(starts: np.ndarray, minors: np.ndarray, majors: int, count: int, what: str):
+    """(major, minor) index of each number, from where each major row or column starts."""
+    whole = starts.dtype.kind in "iu" and len(starts) == majors + 1 and int(starts[0]) == 0
+    lengths = np.diff(starts.astype(np.int64)) if whole else np.array([-1])
+    if lengths.min() < 0 or int(starts[-1]) != count:
+        raise BrokenPickle(f"{what}.indptr does not divide its {count} numbers among {majors} rows or columns")
+    return np.repeat(np.arange(majors), lengths), minors
