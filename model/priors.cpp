@@ -7,11 +7,19 @@
 #include <vector>
 
 #include "model/decoder.h"
+#include "smal/synthetic_prior.h"
 
 namespace q3d::model {
 namespace {
 
 constexpr std::int64_t kPoseNumbers = 105;
+
+// The official names.
+constexpr const char* kMeanPose = "pose_prior_loss.mean_pose";
+constexpr const char* kPrecs = "pose_prior_loss.precs";
+constexpr const char* kUseIndex = "pose_prior_loss.use_index";
+constexpr const char* kMeanBetas = "shape_prior_loss.mean_betas";
+constexpr const char* kBetasPrec = "shape_prior_loss.betas_prec";
 
 std::string shape_text(at::IntArrayRef shape) {
   return fmt::format("[{}]", fmt::join(shape, ", "));
@@ -35,20 +43,35 @@ torch::Tensor read(const smal::SafeTensors& file, const std::string& name,
 }  // namespace
 
 Priors load_priors(const smal::SafeTensors& file, torch::Device device) {
-  const std::string means = "shape_prior_loss.mean_betas";
-  const torch::Tensor stored = file.tensor(means);
+  const torch::Tensor stored = file.tensor(kMeanBetas);
   const std::int64_t families = stored.dim() == 2 ? stored.size(0) : 0;
   if (families < 1) {
     throw std::runtime_error(fmt::format("{}: {}: shape {}, expected [families, {}]", file.path().string(),
-                                         means, shape_text(stored.sizes()), kBetas));
+                                         kMeanBetas, shape_text(stored.sizes()), kBetas));
   }
   Priors priors;
-  priors.mean_pose = read(file, "pose_prior_loss.mean_pose", {kPoseNumbers}, device);
-  priors.precs = read(file, "pose_prior_loss.precs", {kPoseNumbers, kPoseNumbers}, device);
-  priors.use_index = read(file, "pose_prior_loss.use_index", {kPoseNumbers}, device);
-  priors.mean_betas = read(file, means, {families, kBetas}, device);
-  priors.betas_prec = read(file, "shape_prior_loss.betas_prec", {families, kBetas, kBetas}, device);
+  priors.mean_pose = read(file, kMeanPose, {kPoseNumbers}, device);
+  priors.precs = read(file, kPrecs, {kPoseNumbers, kPoseNumbers}, device);
+  priors.use_index = read(file, kUseIndex, {kPoseNumbers}, device);
+  priors.mean_betas = read(file, kMeanBetas, {families, kBetas}, device);
+  priors.betas_prec = read(file, kBetasPrec, {families, kBetas, kBetas}, device);
   return priors;
+}
+
+void save_priors(const std::filesystem::path& path, const Priors& priors) {
+  smal::write_safetensors(path, {{kMeanPose, priors.mean_pose},
+                                 {kPrecs, priors.precs},
+                                 {kUseIndex, priors.use_index},
+                                 {kBetasPrec, priors.betas_prec},
+                                 {kMeanBetas, priors.mean_betas}});
+}
+
+Priors synthetic_priors() {
+  const smal::PosePrior pose = smal::synthetic_pose_prior();
+  const smal::ShapePrior shape = smal::synthetic_shape_prior();
+  torch::Tensor use_index = torch::ones({kPoseNumbers});
+  use_index.narrow(0, 0, 3).zero_();
+  return {pose.mean, pose.precs, use_index, shape.means, shape.precs};
 }
 
 PartialMean pose_prior(const Priors& priors, const torch::Tensor& pose, const torch::Tensor& has_pose) {

@@ -24,6 +24,7 @@
 #include "pipeline/progress.h"
 #include "pipeline/training/training_log.h"
 #include "pipeline/training/training_state.h"
+#include "pipeline/world/random.h"
 #include "smal/asset.h"
 #include "smal/body.h"
 
@@ -139,6 +140,11 @@ model::TrainerOptions trainer_options(const TrainingConfig& config, const PhaseC
   return options;
 }
 
+// One number for the draws of a phase and for LibTorch's generators at its start.
+std::uint64_t phase_seed(const TrainingConfig& config, int phase_index) {
+  return world::Rng(config.seed, {static_cast<std::uint64_t>(phase_index)}).next();
+}
+
 Feed open_feed(const TrainingConfig& config, const PhaseConfig& phase, int phase_index, int threads) {
   std::vector<ShardPool> pools;
   std::vector<double> weights;
@@ -149,8 +155,8 @@ Feed open_feed(const TrainingConfig& config, const PhaseConfig& phase, int phase
   FeedOptions options = config.feed;
   options.threads = threads;
   try {
-    // Phases draw from different streams of one seed.
-    return {std::move(pools), weights, options, config.seed + 0x9e3779b97f4a7c15ULL * (phase_index + 1ULL)};
+    // Phases draw from different streams.
+    return {std::move(pools), weights, options, phase_seed(config, phase_index)};
   } catch (const std::invalid_argument& error) {
     throw ConfigError(fmt::format("phase \"{}\": {}", phase.name, error.what()));
   }
@@ -215,7 +221,7 @@ class Run {
     model::PrimaConfig sizes = from->config();
     sizes.ief_iterations = phase.ief_iterations;
     const auto net = model::with_config(*from, sizes);
-    torch::manual_seed(config_.seed + static_cast<std::uint64_t>(position_.phase));
+    torch::manual_seed(phase_seed(config_, position_.phase));
     model::Trainer trainer(net, smal::SmalBody(asset_, device_.device), priors_,
                            trainer_options(config_, phase));
     if (stored_ && position_.step > 0) trainer.restore(stored_->file);

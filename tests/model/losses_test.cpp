@@ -3,9 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 
 #include "model/decoder.h"
 #include "model/discriminator.h"
+#include "smal/synthetic_prior.h"
+#include "tests/support/paths.h"
 
 namespace q3d::model {
 namespace {
@@ -58,6 +61,31 @@ TEST(ShapePrior, UsesTheFamilyOrTheNearest) {
                       .value()
                       .item<float>(),
                   0.0F);
+}
+
+TEST(Priors, OfTheSyntheticQuadrupedSurviveTheDiskAndKnowTheirOwn) {
+  const testing::ScratchDir scratch;
+  save_priors(scratch.path() / "priors", synthetic_priors());
+  const Priors priors = load_priors(smal::SafeTensors::open(scratch.path() / "priors"), torch::kCPU);
+  std::mt19937_64 random(4);
+  std::vector<torch::Tensor> poses, betas;
+  std::vector<std::int64_t> families;
+  for (int i = 0; i < 500; ++i) {
+    poses.push_back(smal::sample_pose(random).flatten());
+    families.push_back(i % 5);
+    betas.push_back(smal::sample_betas(i % 5, random));
+  }
+  const torch::Tensor none = torch::zeros({500});
+  const torch::Tensor family = torch::tensor(families, torch::kInt64);
+  // Whitened numbers of the priors' own samples have about unit variance; those of a wrong family do not.
+  const double shape = shape_prior(priors, torch::stack(betas), family, none).value().item<double>();
+  EXPECT_NEAR(shape, 1.0, 0.3);
+  const double wrong =
+      shape_prior(priors, torch::stack(betas), (family + 1) % 5, none).value().item<double>();
+  EXPECT_GT(wrong, 2.0 * shape);
+  const double pose = pose_prior(priors, torch::stack(poses), none).value().item<double>();
+  EXPECT_GT(pose, 0.2);
+  EXPECT_LT(pose, 2.0);
 }
 
 TEST(PartialMean, OfNothingIsZero) {
