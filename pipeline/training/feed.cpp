@@ -98,6 +98,11 @@ FeedBatch empty_batch(std::int64_t size, std::int64_t first_draw) {
   return batch;
 }
 
+int arena_threads(int wanted) {
+  if (wanted > 0) return wanted;
+  return tbb::task_arena::automatic;
+}
+
 }  // namespace
 
 Feed::Feed(std::vector<ShardPool> pools, const std::vector<double>& weights, const FeedOptions& options,
@@ -105,8 +110,7 @@ Feed::Feed(std::vector<ShardPool> pools, const std::vector<double>& weights, con
     : pools_(std::move(pools)),
       draws_(shares(pools_, weights), seed),
       options_(options),
-      arena_(std::make_unique<tbb::task_arena>(options.threads > 0 ? options.threads
-                                                                   : tbb::task_arena::automatic)) {
+      arena_(std::make_unique<tbb::task_arena>(arena_threads(options.threads))) {
   if (options.batch < 1) throw std::invalid_argument("a batch must hold at least one sample");
 }
 

@@ -23,7 +23,7 @@ enum class KeypointWeight { label, raw_v };
 struct FeedOptions {
   int batch = 48;
   bool augment = true;
-  loaders::AugmentOptions augmentation;
+  loaders::AugmentOptions augmentation{};
   KeypointWeight keypoint_weight = KeypointWeight::label;
   int threads = 0;  // that decode and warp; 0 = all cores. Changes no bit
 };

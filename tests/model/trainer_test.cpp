@@ -134,10 +134,12 @@ TEST_F(TrainerTest, TheFrozenEncoderStays) {
   learner.step(seeded_batch(body_, 4));
   for (const auto& parameter : learner.net().named_parameters()) {
     const bool equal = torch::equal(parameter.value(), checkpoint_->tensor(parameter.key()));
-    if (parameter.key().starts_with("bioclip_embedding.species_model."))
-      EXPECT_TRUE(equal) << parameter.key();
-    if (parameter.key() == "backbone.patch_embed.proj.weight") EXPECT_FALSE(equal);
-    if (parameter.key() == "smal_head.decpose.2.weight") EXPECT_FALSE(equal);
+    const std::string& name = parameter.key();
+    if (name.starts_with("bioclip_embedding.species_model.")) {
+      EXPECT_TRUE(equal) << name;
+    } else if (name == "backbone.patch_embed.proj.weight" || name == "smal_head.decpose.2.weight") {
+      EXPECT_FALSE(equal) << name;
+    }
   }
 }
 
