@@ -80,7 +80,7 @@ torch::Tensor ClipVisual::forward(const torch::Tensor& images) const {
   return ln_post_->forward(x.select(1, 0)).matmul(proj_);
 }
 
-BioClip::BioClip(const PrimaConfig& config, const Placement& placement) {
+BioClip::BioClip(const PrimaConfig& config, const Placement& placement) : learns_(config.learn_bio_encoder) {
   const auto species_model = register_module("species_model", std::make_shared<torch::nn::Module>());
   visual_ = species_model->register_module("visual", std::make_shared<ClipVisual>(config, placement));
   const auto projection = register_module("projection", std::make_shared<torch::nn::Module>());
@@ -93,7 +93,7 @@ BioClip::BioClip(const PrimaConfig& config, const Placement& placement) {
 torch::Tensor BioClip::forward(const torch::Tensor& images, const Observer& observe) const {
   torch::Tensor feature;
   {
-    const torch::NoGradGuard frozen;
+    const torch::AutoGradMode mode(learns_ && torch::GradMode::is_enabled());
     const torch::Tensor resized =
         torch::upsample_bilinear2d(images, {kClipSidePx, kClipSidePx}, /*align_corners=*/false);
     if (observe) observe("bioclip_resized_img", resized);

@@ -37,13 +37,14 @@ class BioClip : public torch::nn::Module {
   BioClip(const PrimaConfig& config, const Placement& placement);
 
   // images (B, 3, 256, 256) float32, normalised as for the ViT -> bio token (B, embed_dim) float32. The
-  // encoder is frozen: gradients reach the projection alone.
+  // encoder is frozen, so that gradients reach the projection alone, unless the config lets it learn.
   torch::Tensor forward(const torch::Tensor& images, const Observer& observe = {}) const;
 
  private:
   std::shared_ptr<ClipVisual> visual_;
   std::shared_ptr<Linear> projection_;
   std::shared_ptr<LayerNorm> projection_norm_;
+  bool learns_;
 };
 
 }  // namespace q3d::model

@@ -98,8 +98,8 @@ bool is_allowed_extra(const std::string& name) {
   static constexpr std::array<std::string_view, 7> kTextTower{
       "transformer.", "token_embedding.", "positional_embedding", "ln_final.", "text_projection",
       "logit_scale",  "attn_mask"};
-  static constexpr std::array<std::string_view, 4> kOthers{"smal.", "discriminator.", "shape_prior_loss.",
-                                                           "pose_prior_loss."};
+  static constexpr std::array<std::string_view, 5> kOthers{"smal.", "discriminator.", "shape_prior_loss.",
+                                                           "pose_prior_loss.", "training."};
   const std::string_view view(name);
   const auto starts = [](std::string_view text) {
     return [text](std::string_view prefix) { return text.substr(0, prefix.size()) == prefix; };
@@ -147,8 +147,11 @@ std::shared_ptr<PrimaNet> load_net(const smal::SafeTensors& file, const PrimaCon
 }
 
 void write_checkpoint(const std::filesystem::path& path, const PrimaConfig& config,
-                      const smal::NamedTensors& tensors) {
-  smal::write_safetensors(path, tensors, {{kConfigKey, to_json(config).dump()}});
+                      const smal::NamedTensors& tensors,
+                      const std::map<std::string, std::string>& more_metadata) {
+  std::map<std::string, std::string> metadata = more_metadata;
+  metadata[kConfigKey] = to_json(config).dump();
+  smal::write_safetensors(path, tensors, metadata);
 }
 
 }  // namespace q3d::model

@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -28,7 +29,7 @@ struct TensorSpec {
 std::vector<TensorSpec> expected_tensors(const PrimaConfig& config);
 
 // True for what a checkpoint may carry although the network does not hold it: CLIP's text tower,
-// discriminator.*, the priors, `initialized` and smal.*.
+// discriminator.*, the priors, `initialized`, smal.* and training.*, the state of a training run.
 bool is_allowed_extra(const std::string& name);
 
 // The config in the file's metadata. Throws std::runtime_error when it is absent or not valid.
@@ -40,8 +41,9 @@ PrimaConfig checkpoint_config(const smal::SafeTensors& file);
 std::shared_ptr<PrimaNet> load_net(const smal::SafeTensors& file, const PrimaConfig& config,
                                    const smal::SmalAsset& asset, const Placement& placement);
 
-// Writes the tensors with the config in the metadata. Throws std::runtime_error.
+// Writes the tensors with the config, and what else is given, in the metadata. Throws std::runtime_error.
 void write_checkpoint(const std::filesystem::path& path, const PrimaConfig& config,
-                      const smal::NamedTensors& tensors);
+                      const smal::NamedTensors& tensors,
+                      const std::map<std::string, std::string>& more_metadata = {});
 
 }  // namespace q3d::model

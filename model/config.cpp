@@ -38,6 +38,9 @@ constexpr std::array kFields{
     Field{"dec_ffn", &PrimaConfig::dec_ffn},
     Field{"ief_iterations", &PrimaConfig::ief_iterations},
     Field{"focal_px", &PrimaConfig::focal_px},
+    Field{"learn_bio_encoder", &PrimaConfig::learn_bio_encoder},
+    Field{"betas_from_bio", &PrimaConfig::betas_from_bio},
+    Field{"keypoint_tokens", &PrimaConfig::keypoint_tokens},
     Field{"drop_path", &PrimaConfig::drop_path},
     Field{"dropout", &PrimaConfig::dropout},
 };
@@ -111,8 +114,8 @@ void check_config(const PrimaConfig& config) {
   constexpr std::int64_t kLargest = 1 << 16;  // far above any real width; keeps products inside 64 bits
   for (const Field& field : kFields) {
     if (const auto* size = std::get_if<std::int64_t PrimaConfig::*>(&field.member)) {
-      require(config.**size >= 1 && config.**size <= kLargest,
-              fmt::format("'{}' = {} lies outside [1, {}]", field.key, config.**size, kLargest));
+      require(config.*(*size) >= 1 && config.*(*size) <= kLargest,
+              fmt::format("'{}' = {} lies outside [1, {}]", field.key, config.*(*size), kLargest));
     }
   }
   require_divides("heads", config.heads, "embed_dim", config.embed_dim);
@@ -139,10 +142,10 @@ PrimaConfig config_from_json(const nlohmann::json& json) {
     const Member member = find_field(key).member;
     if (const auto* size = std::get_if<std::int64_t PrimaConfig::*>(&member)) {
       require_type(key, value, value.is_number_integer(), "an integer");
-      config.** size = value.get<std::int64_t>();
+      config.*(*size) = value.get<std::int64_t>();
     } else if (const auto* real = std::get_if<double PrimaConfig::*>(&member)) {
       require_type(key, value, value.is_number(), "a number");
-      config.** real = value.get<double>();
+      config.*(*real) = value.get<double>();
     } else {
       require_type(key, value, value.is_boolean(), "true or false");
       config.*std::get<bool PrimaConfig::*>(member) = value.get<bool>();

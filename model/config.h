@@ -27,6 +27,11 @@ struct PrimaConfig {
   std::int64_t dec_ffn = 5120;
   std::int64_t ief_iterations = 1;
   double focal_px = 1000.0;  // at the 256-px crop
+  // the paper's ablations; the parameters are the same set whatever these say
+  bool learn_bio_encoder =
+      false;                    // true: without F_bio, an encoder trained from random weights takes its place
+  bool betas_from_bio = true;   // false: without beta_init, the betas start from zero
+  bool keypoint_tokens = true;  // false: without T_keypoint, no keypoint token nor auxiliary keypoint
   // training only
   double drop_path = 0.55;  // of the last ViT block; rises linearly from 0 at the first
   double dropout = 0.1;     // in the decoder layers, attention included

@@ -103,7 +103,10 @@ struct Decoder::KeypointUpdate {
   torch::Tensor augment_3d;    // (B, 26, D)
 };
 
-Decoder::Decoder(const PrimaConfig& config, const Placement& placement) : rounds_(config.ief_iterations) {
+Decoder::Decoder(const PrimaConfig& config, const Placement& placement)
+    : rounds_(config.ief_iterations),
+      betas_from_bio_(config.betas_from_bio),
+      has_keypoint_tokens_(config.keypoint_tokens) {
   const std::int64_t width = config.dec_dim;
   const Placement exact = placement.in_float32();
   const auto embedding = [&](const std::string& name) {
@@ -160,6 +163,9 @@ DecoderMemory Decoder::remember(const torch::Tensor& image_tokens, const Observe
 }
 
 torch::Tensor Decoder::initial_betas(const torch::Tensor& bio_token) const {
+  if (!betas_from_bio_) {
+    return torch::zeros({bio_token.size(0), kBetas}, bio_token.options().dtype(torch::kFloat32));
+  }
   return bio_to_betas_init_->forward(bio_token);
 }
 
@@ -191,7 +197,8 @@ torch::Tensor Decoder::parameter_token(const DecoderOutput& estimate) const {
   return torch::relu(param_to_token_norm_->forward(param_to_token_->forward(values)));
 }
 
-// tokens (B, 53, D) through all layers -> the parameter token (B, D). Notes the keypoints on the way.
+// tokens (B, 53, D), or (B, 1, D) without keypoint tokens, through all layers -> the parameter token (B, D).
+// Notes the keypoints on the way.
 torch::Tensor Decoder::run_layers(torch::Tensor tokens, const DecoderMemory& memory, DecoderOutput& estimate,
                                   const std::string& prefix, const Observer& observe) const {
   for (std::size_t i = 0; i < layers_.size(); ++i) {
@@ -200,6 +207,7 @@ torch::Tensor Decoder::run_layers(torch::Tensor tokens, const DecoderMemory& mem
     tokens = layers_[i]->forward(tokens, memory.keys_values[i], last && !observe ? 1 : 0);
     if (observe) observe(prefix + "layer" + std::to_string(i) + "_tokens", tokens);
     if (last) break;
+    if (!has_keypoint_tokens_) continue;
     const KeypointUpdate update = update_keypoints(tokens, memory.sampled);
     if (observe) {
       const std::string name = prefix + "upd" + std::to_string(i) + "_";
@@ -216,29 +224,38 @@ torch::Tensor Decoder::run_layers(torch::Tensor tokens, const DecoderMemory& mem
   return norm_->forward(tokens.select(1, 0));
 }
 
+torch::Tensor Decoder::initial_tokens(const DecoderOutput& estimate,
+                                      const AdaptedParameters& parameters) const {
+  const torch::Tensor parameter = parameter_token(estimate).unsqueeze(1);
+  if (!has_keypoint_tokens_) return parameter;
+  const auto for_each = [&](const torch::Tensor& embeddings) {
+    return embeddings.expand({parameter.size(0), kKeypoints, embeddings.size(-1)});
+  };
+  return torch::cat(
+      {parameter, for_each(parameters.keypoint_2d_embeddings), for_each(parameters.keypoint_3d_embeddings)},
+      1);
+}
+
 DecoderOutput Decoder::refine(const DecoderMemory& memory, const torch::Tensor& initial_betas,
                               const AdaptedParameters& parameters, const Observer& observe) const {
   const std::int64_t batch = initial_betas.size(0);
-  const auto for_each = [batch](const torch::Tensor& embeddings) {
-    return embeddings.expand({batch, kKeypoints, embeddings.size(-1)});
-  };
   DecoderOutput estimate;
   estimate.pose_6d = init_pose_.expand({batch, -1});
   estimate.betas = initial_betas;
   estimate.camera = init_cam_.expand({batch, -1});
+  if (!has_keypoint_tokens_) {
+    estimate.aux_keypoints_2d = torch::zeros({batch, kKeypoints, 2}, initial_betas.options());
+    estimate.aux_keypoints_3d = torch::zeros({batch, kKeypoints, 3}, initial_betas.options());
+  }
   for (std::int64_t round = 0; round < rounds_; ++round) {
     const std::string prefix = "ief" + std::to_string(round) + "_";
-    const torch::Tensor parameter = parameter_token(estimate);
-    const torch::Tensor tokens =
-        torch::cat({parameter.unsqueeze(1), for_each(parameters.keypoint_2d_embeddings),
-                    for_each(parameters.keypoint_3d_embeddings)},
-                   1);
+    const torch::Tensor tokens = initial_tokens(estimate, parameters);
     const torch::Tensor readout = run_layers(tokens, memory, estimate, prefix, observe);
     const torch::Tensor pose_change = apply_mlp(parameters.pose_head, readout);
     const torch::Tensor betas_change = apply_mlp(parameters.shape_head, readout);
     const torch::Tensor camera_change = apply_mlp(parameters.camera_head, readout);
     if (observe) {
-      observe(prefix + "param_token_in", parameter);
+      observe(prefix + "param_token_in", tokens.select(1, 0));
       observe(prefix + "param_token_out", readout);
       observe(prefix + "delta_decpose", pose_change);
       observe(prefix + "delta_decshape", betas_change);

@@ -36,7 +36,7 @@ struct DecoderOutput {
   torch::Tensor pose_6d;           // (B, 210)
   torch::Tensor betas;             // (B, 41)
   torch::Tensor camera;            // (B, 3) = (s, tx, ty)
-  torch::Tensor aux_keypoints_2d;  // (B, 26, 2) crop units: the last update's
+  torch::Tensor aux_keypoints_2d;  // (B, 26, 2) crop units: the last update's; zeros without keypoint tokens
   torch::Tensor aux_keypoints_3d;  // (B, 26, 3): not centred
 };
 
@@ -49,7 +49,7 @@ class Decoder : public torch::nn::Module {
   // image_tokens (B, 192, embed_dim), row-major over 16 x 12.
   DecoderMemory remember(const torch::Tensor& image_tokens, const Observer& observe = {}) const;
 
-  // bio_token (B, embed_dim) -> (B, 41).
+  // bio_token (B, embed_dim) -> (B, 41); zeros where the config takes no betas from it.
   torch::Tensor initial_betas(const torch::Tensor& bio_token) const;
   // betas (B, 41) -> (B, 128) of unit length, for the contrastive loss.
   torch::Tensor shape_feature(const torch::Tensor& betas) const;
@@ -64,10 +64,13 @@ class Decoder : public torch::nn::Module {
   struct KeypointUpdate;
   KeypointUpdate update_keypoints(const torch::Tensor& tokens, const torch::Tensor& sampled_source) const;
   torch::Tensor parameter_token(const DecoderOutput& estimate) const;
+  torch::Tensor initial_tokens(const DecoderOutput& estimate, const AdaptedParameters& parameters) const;
   torch::Tensor run_layers(torch::Tensor tokens, const DecoderMemory& memory, DecoderOutput& estimate,
                            const std::string& prefix, const Observer& observe) const;
 
   std::int64_t rounds_;
+  bool betas_from_bio_;
+  bool has_keypoint_tokens_;
   torch::Tensor init_pose_;  // (1, 210)
   torch::Tensor init_cam_;   // (1, 3)
   torch::Tensor position_;   // (192, D), not a parameter

@@ -1,39 +1,16 @@
-// Fresh weights. Only uniform draws from a counter-based generator are used, so that a seed gives the same
-// bytes on every machine: library normal distributions go through vectorised logarithms that differ between
-// CPUs.
+// Fresh weights. A seed gives the same bytes on every machine.
 #include "model/init.h"
 
 #include <cmath>
 #include <string_view>
 
 #include "model/prima.h"
+#include "model/seeded_uniform.h"
 
 namespace q3d::model {
 namespace {
 
 constexpr double kEmbeddingStd = 0.02;
-
-std::uint64_t mix(std::uint64_t x) {  // the finaliser of SplitMix64 (Steele, Lea, Flood 2014)
-  x += 0x9e3779b97f4a7c15ULL;
-  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ULL;
-  x = (x ^ (x >> 27)) * 0x94d049bb133111ebULL;
-  return x ^ (x >> 31);
-}
-
-// Each tensor has its own stream, named by its name.
-std::uint64_t stream_of(std::uint64_t seed, std::string_view name) {
-  std::uint64_t hash = mix(seed);
-  for (const char c : name) hash = mix(hash ^ static_cast<unsigned char>(c));
-  return hash;
-}
-
-void fill_uniform(torch::Tensor& tensor, double bound, std::uint64_t stream) {
-  float* values = tensor.data_ptr<float>();
-  for (std::int64_t i = 0; i < tensor.numel(); ++i) {
-    const double unit = static_cast<double>(mix(stream + static_cast<std::uint64_t>(i)) >> 11) * 0x1p-53;
-    values[i] = static_cast<float>((2.0 * unit - 1.0) * bound);
-  }
-}
 
 bool ends_with(std::string_view name, std::string_view end) {
   return name.size() >= end.size() && name.substr(name.size() - end.size()) == end;
@@ -76,7 +53,7 @@ torch::Tensor initial_tensor(const TensorSpec& spec, std::uint64_t seed) {
     return ends_with(spec.name, ".weight") ? torch::ones(spec.shape) : torch::zeros(spec.shape);
   }
   torch::Tensor tensor = torch::empty(spec.shape);
-  fill_uniform(tensor, uniform_bound(spec), stream_of(seed, spec.name));
+  fill_uniform(tensor, uniform_bound(spec), seed, spec.name);
   return tensor;
 }
 

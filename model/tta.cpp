@@ -134,12 +134,23 @@ class Adaptation {
     ++taken_;
     if (std::find(goes_on.begin(), goes_on.end(), true) != goes_on.end()) {
       // The gradient of the sum of losses: no operation mixes instances, so each one's stays its own.
-      slots_.step(torch::autograd::grad({iterate.loss}, leaves, {torch::ones_like(iterate.loss)}),
-                  options_.learning_rate);
+      slots_.step(gradients(iterate.loss, leaves), options_.learning_rate);
     }
     for (std::int64_t slot = slots_.size() - 1; slot >= 0; --slot) {
       if (!goes_on[static_cast<std::size_t>(slot)]) slots_.remove(slot);
     }
+  }
+
+  // Zeros where a leaf has no part in the loss: the embeddings of a network without keypoint tokens.
+  static std::vector<torch::Tensor> gradients(const torch::Tensor& loss,
+                                              const std::vector<torch::Tensor>& leaves) {
+    auto result =
+        torch::autograd::grad({loss}, leaves, {torch::ones_like(loss)}, /*retain_graph=*/std::nullopt,
+                              /*create_graph=*/false, /*allow_unused=*/true);
+    for (std::size_t i = 0; i < leaves.size(); ++i) {
+      if (!result[i].defined()) result[i] = torch::zeros_like(leaves[i]);
+    }
+    return result;
   }
 
   bool any_step_left() const {

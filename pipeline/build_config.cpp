@@ -2,11 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <regex>
 #include <set>
 
-#include "manifests/atomic_file.h"
+#include "pipeline/config_layers.h"
 #include "pipeline/json_fields.h"
 
 namespace q3d::pipeline {
@@ -17,15 +16,6 @@ namespace fs = std::filesystem;
 
 void require(bool holds, const std::string& where, const std::string& what) {
   if (!holds) throw ConfigError(where + ": " + what);
-}
-
-void require_one_of(const std::string& value, const std::vector<std::string>& known,
-                    const std::string& where) {
-  if (std::find(known.begin(), known.end(), value) != known.end()) return;
-  std::string list;
-  for (const auto& word : known) list += (list.empty() ? "" : ", ") + word;
-  throw ConfigError(fmt::format("{}: \"{}\" is not known; expected one of: {}. Did you mean \"{}\"?", where,
-                                value, list, nearest_word(value, known)));
 }
 
 loaders::DatasetOptions parse_dataset(const json& object, const std::string& where) {
@@ -123,30 +113,13 @@ void parse_calibrate(const json& object, const std::string& where, filters::Targ
           "the shares must be greater than 0 and their sum less than 1");
 }
 
-// Turns the paths of one file into absolute ones, so that files in different folders can be laid over each
-// other.
 void resolve_paths(json& config, const fs::path& folder) {
-  const auto resolve = [&](json& object, const char* key) {
-    if (object.is_object() && object.contains(key) && object[key].is_string()) {
-      object[key] = (folder / object[key].get<std::string>()).lexically_normal().string();
-    }
-  };
   if (config.contains("network")) {
-    resolve(config["network"], "checkpoint");
-    resolve(config["network"], "smal_asset");
+    resolve_path(config["network"], "checkpoint", folder);
+    resolve_path(config["network"], "smal_asset", folder);
   }
   if (config.contains("datasets") && config["datasets"].is_array()) {
-    for (auto& dataset : config["datasets"]) resolve(dataset, "root");
-  }
-}
-
-json read_json(const fs::path& file) {
-  try {
-    return json::parse(manifests::read_file(file), nullptr, true, /*ignore_comments=*/true);
-  } catch (const json::parse_error& error) {
-    throw ConfigError(fmt::format("{}: not valid JSON: {}", file.string(), error.what()));
-  } catch (const std::runtime_error& error) {
-    throw ConfigError(error.what());
+    for (auto& dataset : config["datasets"]) resolve_path(dataset, "root", folder);
   }
 }
 
@@ -191,19 +164,9 @@ BuildConfig parse_build_config(const json& merged, const std::string& where) {
 }
 
 BuildConfig load_build_config(const std::vector<fs::path>& files) {
-  json as_written = json::object();
-  json resolved = json::object();
-  std::string where;
-  for (const auto& file : files) {
-    json layer = read_json(file);
-    require(layer.is_object(), file.string(), "expected a JSON object at the top level");
-    as_written.merge_patch(layer);
-    resolve_paths(layer, fs::absolute(file).parent_path());
-    resolved.merge_patch(layer);
-    where += (where.empty() ? "" : " + ") + file.string();
-  }
-  BuildConfig config = parse_build_config(resolved, where);
-  config.as_written = std::move(as_written);
+  ConfigLayers layers = read_config_layers(files, resolve_paths);
+  BuildConfig config = parse_build_config(layers.resolved, layers.where);
+  config.as_written = std::move(layers.as_written);
   return config;
 }
 

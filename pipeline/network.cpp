@@ -11,6 +11,7 @@
 #include "model/config.h"
 #include "model/device.h"
 #include "model/prima.h"
+#include "model/priors.h"
 #include "model/tta.h"
 #include "pipeline/errors.h"
 #include "smal/synthetic_quadruped.h"
@@ -193,6 +194,10 @@ void write_initial_checkpoint(const std::filesystem::path& path, const std::stri
 
 void write_synthetic_asset(const std::filesystem::path& path) {
   smal::save_asset(path, smal::make_synthetic_quadruped());
+}
+
+void write_synthetic_priors(const std::filesystem::path& path) {
+  model::save_priors(path, model::synthetic_priors());
 }
 
 }  // namespace q3d::pipeline

@@ -79,4 +79,7 @@ void write_initial_checkpoint(const std::filesystem::path& path, const std::stri
 // The synthetic quadruped (smal/synthetic_quadruped.h) as an asset file.
 void write_synthetic_asset(const std::filesystem::path& path);
 
+// Its pose and shape priors (smal/synthetic_prior.h), under the official names.
+void write_synthetic_priors(const std::filesystem::path& path);
+
 }  // namespace q3d::pipeline

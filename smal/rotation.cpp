@@ -31,6 +31,25 @@ torch::Tensor antisymmetric_vector(const torch::Tensor& matrix) {
   return torch::stack({at(2, 1) - at(1, 2), at(0, 2) - at(2, 0), at(1, 0) - at(0, 1)}, -1);
 }
 
+// (..., 3, 3) -> (..., 4) unit quaternion (w, x, y, z) with w >= 0. Each row of 4 q q^T is a multiple of q;
+// the row with the largest diagonal element is at least 1 long, so its normalisation is smooth.
+torch::Tensor matrix_to_quaternion(const torch::Tensor& matrix) {
+  const auto at = [&matrix](int row, int column) { return matrix.index({Ellipsis, row, column}); };
+  const torch::Tensor xx = at(0, 0), yy = at(1, 1), zz = at(2, 2);
+  const torch::Tensor wx = at(2, 1) - at(1, 2), wy = at(0, 2) - at(2, 0), wz = at(1, 0) - at(0, 1);
+  const torch::Tensor xy = at(1, 0) + at(0, 1), xz = at(0, 2) + at(2, 0), yz = at(2, 1) + at(1, 2);
+  const torch::Tensor products = torch::stack({1 + xx + yy + zz, wx, wy, wz,  //
+                                               wx, 1 + xx - yy - zz, xy, xz,  //
+                                               wy, xy, 1 - xx + yy - zz, yz,  //
+                                               wz, xz, yz, 1 - xx - yy + zz},
+                                              -1)
+                                     .unflatten(-1, {4, 4});
+  const torch::Tensor longest = products.diagonal(0, -2, -1).argmax(-1, true).unsqueeze(-1);
+  const torch::Tensor row = products.take_along_dim(longest, -2).squeeze(-2);
+  const torch::Tensor quaternion = row / length(row);
+  return torch::where(quaternion.select(-1, 0).unsqueeze(-1) < 0, -quaternion, quaternion);
+}
+
 }  // namespace
 
 torch::Tensor rot6d_to_matrix(const torch::Tensor& rot6d) {
@@ -81,6 +100,20 @@ torch::Tensor matrix_to_axis_angle(const torch::Tensor& matrix) {
   const torch::Tensor doubled = antisymmetric_vector(matrix);
   const torch::Tensor general = doubled / (2.0 * angle.sin()).clamp_min(1e-6) * angle;
   return torch::where(angle < 1e-4, 0.5 * doubled, general);
+}
+
+torch::Tensor matrix_to_axis_angle_smooth(const torch::Tensor& matrix) {
+  expect_trailing(matrix, "matrix_to_axis_angle_smooth", "matrix", {3, 3});
+  const torch::Tensor quaternion = matrix_to_quaternion(matrix);
+  const torch::Tensor cosine = quaternion.index({Ellipsis, Slice(0, 1)});
+  const torch::Tensor sine_axis = quaternion.index({Ellipsis, Slice(1, 4)});
+  const torch::Tensor squared = sine_axis.square().sum(-1, true);
+  // angle / sin(angle / 2) from its series where the quotient's gradient would divide zero by zero.
+  const torch::Tensor is_small = squared < 1e-4;
+  const torch::Tensor sine = torch::where(is_small, torch::ones_like(squared), squared).sqrt();
+  const torch::Tensor quotient = 2.0 * torch::atan2(sine, cosine) / sine;
+  const torch::Tensor series = 2.0 + squared * (1.0 / 3.0 + squared * (3.0 / 20.0));
+  return sine_axis * torch::where(is_small, series, quotient);
 }
 
 }  // namespace q3d::smal

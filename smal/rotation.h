@@ -23,4 +23,8 @@ torch::Tensor axis_angle_to_matrix_exact(const torch::Tensor& axis_angle);
 // identity.
 torch::Tensor matrix_to_axis_angle(const torch::Tensor& matrix);
 
+// The same map by way of a quaternion: exact up to and including half turns, with a finite gradient
+// everywhere, also at the identity. For training.
+torch::Tensor matrix_to_axis_angle_smooth(const torch::Tensor& matrix);
+
 }  // namespace q3d::smal

@@ -19,5 +19,6 @@ Command add_verify(CLI::App& app);
 Command add_inspect(CLI::App& app);
 Command add_init(CLI::App& app);
 Command add_sample(CLI::App& app);
+Command add_train(CLI::App& app);
 
 }  // namespace q3d::pipeline::cli

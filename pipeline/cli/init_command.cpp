@@ -15,6 +15,7 @@ namespace {
 struct Arguments {
   std::filesystem::path out;
   std::filesystem::path asset;
+  std::filesystem::path priors;
   std::string size = "small";
   std::uint64_t seed = 0;
   bool json = false;
@@ -32,6 +33,8 @@ Command add_init(CLI::App& app) {
   command->add_option("--seed", arguments->seed, "the same seed gives the same bytes")->capture_default_str();
   command->add_option("--smal-asset", arguments->asset,
                       "also write the synthetic quadruped with SMAL's dimensions");
+  command->add_option("--priors", arguments->priors,
+                      "also write the synthetic quadruped's pose and shape priors, for training");
   command->add_flag("--json", arguments->json, "print a machine-readable summary on stdout");
   command->footer(
       "Examples:\n"
@@ -42,8 +45,9 @@ Command add_init(CLI::App& app) {
       "itself cannot\n"
       "be redistributed; the synthetic quadruped has its dimensions.");
   return [arguments] {
-    if (arguments->out.empty() && arguments->asset.empty()) {
-      throw ConfigError("init: give --out for a checkpoint, --smal-asset for the body, or both");
+    if (arguments->out.empty() && arguments->asset.empty() && arguments->priors.empty()) {
+      throw ConfigError(
+          "init: give at least one of --out (a checkpoint), --smal-asset (the body) and --priors");
     }
     nlohmann::ordered_json document = nlohmann::ordered_json::object();
     if (!arguments->out.empty()) {
@@ -56,6 +60,11 @@ Command add_init(CLI::App& app) {
       write_synthetic_asset(arguments->asset);
       fmt::print(stderr, "wrote {}\n", arguments->asset.string());
       document["smal_asset"] = arguments->asset.string();
+    }
+    if (!arguments->priors.empty()) {
+      write_synthetic_priors(arguments->priors);
+      fmt::print(stderr, "wrote {}\n", arguments->priors.string());
+      document["priors"] = arguments->priors.string();
     }
     if (arguments->json) fmt::print("{}\n", document.dump());
     return 0;

@@ -54,6 +54,40 @@ TEST(Rotation, ExactFormHasAFiniteGradientAtZero) {
   EXPECT_LT(worst(zero.grad(), vector3(0, 0, 1)), 1e-15);
 }
 
+TEST(Rotation, SmoothLogarithmInvertsTheExactForm) {
+  torch::manual_seed(5);
+  torch::Tensor axis = torch::randn({200, 3}, torch::kFloat64);
+  axis = axis / axis.norm(2, 1, true);
+  for (const double angle : {0.0, 1e-9, 1e-4, 0.0199, 0.0201, 1.0, 3.0, M_PI - 1e-3, M_PI - 1e-9}) {
+    const torch::Tensor expected = angle * axis;
+    const torch::Tensor got = matrix_to_axis_angle_smooth(axis_angle_to_matrix_exact(expected));
+    EXPECT_LT(worst(got, expected), 1e-7 * std::max(angle, 1e-6)) << angle;
+  }
+}
+
+TEST(Rotation, SmoothLogarithmHasItsTrueGradientAtTheIdentity) {
+  // Near the identity the rotation vector is half the antisymmetric part of the matrix.
+  const torch::Tensor identity = torch::eye(3, torch::kFloat64).requires_grad_();
+  matrix_to_axis_angle_smooth(identity)[2].backward();
+  const torch::Tensor expected =
+      torch::tensor({0.0, -0.5, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0}, torch::kFloat64).view({3, 3});
+  EXPECT_LT(worst(identity.grad(), expected), 1e-12);
+  // The official form fails there, which is why training uses the other.
+  const torch::Tensor again = torch::eye(3, torch::kFloat64).requires_grad_();
+  matrix_to_axis_angle(again)[2].backward();
+  EXPECT_TRUE(again.grad().isnan().any().item<bool>());
+}
+
+TEST(Rotation, SmoothLogarithmsGradientIsFiniteAtHalfTurns) {
+  for (const int axis : {0, 1, 2}) {
+    torch::Tensor turn = -torch::eye(3, torch::kFloat64);
+    turn[axis][axis] = 1.0;
+    turn.requires_grad_();
+    matrix_to_axis_angle_smooth(turn).sum().backward();
+    EXPECT_TRUE(turn.grad().isfinite().all().item<bool>());
+  }
+}
+
 TEST(Rotation, Rot6dIgnoresLengthAndSkew) {
   const torch::Tensor rot6d = torch::tensor({2.0, 0.0, 0.0, 5.0, 3.0, 0.0}, torch::kFloat64);
   EXPECT_TRUE(torch::equal(rot6d_to_matrix(rot6d), torch::eye(3, torch::kFloat64)));

@@ -1,0 +1,25 @@
+// LibTorch's autocast for one scope.
+#pragma once
+
+#include <torch/torch.h>
+
+namespace q3d::model {
+
+// While it lives, and if it is enabled, matrix products, convolutions and attention of `device`'s kind run in
+// bfloat16; sums, norms and what LibTorch calls unsafe stay float32. Affects the calling thread. Backward
+// passes belong outside. Casts of weights are remembered within the scope and forgotten at its end, since the
+// weights then change.
+class MixedPrecision {
+ public:
+  MixedPrecision(torch::Device device, bool enabled);
+  ~MixedPrecision();
+  MixedPrecision(const MixedPrecision&) = delete;
+  MixedPrecision& operator=(const MixedPrecision&) = delete;
+
+ private:
+  at::DeviceType kind_;
+  bool was_enabled_;
+  torch::ScalarType previous_dtype_;
+};
+
+}  // namespace q3d::model

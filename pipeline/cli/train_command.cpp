@@ -1,0 +1,74 @@
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "pipeline/cli/commands.h"
+#include "pipeline/progress.h"
+#include "pipeline/training/training_run.h"
+
+namespace q3d::pipeline::cli {
+namespace {
+
+struct Arguments {
+  std::vector<std::filesystem::path> configs;
+  std::string stage;
+  TrainingOptions options;
+  bool json = false;
+};
+
+void print_summary(const TrainingSummary& summary) {
+  fmt::print(stderr, "\n{} of {} steps done, {} of them now, in {}\n", summary.steps_done,
+             summary.steps_total, summary.steps_here, human_duration(summary.seconds));
+  if (summary.finished) {
+    fmt::print(stderr, "  weights: {}\n", summary.model.string());
+  } else {
+    fmt::print(stderr, "  run the same command to go on\n");
+  }
+}
+
+nlohmann::ordered_json to_json(const TrainingSummary& summary) {
+  return {{"steps_done", summary.steps_done}, {"steps_total", summary.steps_total},
+          {"steps_here", summary.steps_here}, {"finished", summary.finished},
+          {"last_loss", summary.last_loss},   {"model", summary.model.string()},
+          {"seconds", summary.seconds}};
+}
+
+}  // namespace
+
+Command add_train(CLI::App& app) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = app.add_subcommand("train", "shards in, a trained network out");
+  command->add_option("-c,--config", arguments->configs, "JSON config; a second one is laid over the first")
+      ->required()
+      ->check(CLI::ExistingFile);
+  command->add_option("-s,--stage", arguments->stage, "the config's stage to train: 1 or 3")->required();
+  command->add_option("-o,--out", arguments->options.out, "folder of this run: state, log and weights")
+      ->required();
+  command
+      ->add_option("-t,--threads", arguments->options.threads, "threads that prepare batches (0 = all cores)")
+      ->check(CLI::NonNegativeNumber);
+  command
+      ->add_option("--max-steps", arguments->options.max_steps,
+                   "save and leave after so many steps (0 = train to the end)")
+      ->check(CLI::NonNegativeNumber);
+  command->add_flag("--json", arguments->json, "print a machine-readable summary on stdout");
+  command->add_flag("-q,--quiet", arguments->options.quiet, "no progress");
+  command->footer(
+      "Examples:\n"
+      "  quadruped3d train --config configs/train_sample.json --stage 1 --out out/stage1\n"
+      "  quadruped3d train -c my.json --stage 3 -o out/stage3 --max-steps 1000\n"
+      "A run that was stopped goes on from its newest state when the same command is run again, with the "
+      "weights that\n"
+      "it would have had anyway. docs/training.md describes the config, the log and the state.");
+  return [arguments] {
+    const TrainingSummary summary =
+        train(load_training_config(arguments->configs, arguments->stage), arguments->options);
+    print_summary(summary);
+    if (arguments->json) fmt::print("{}\n", to_json(summary).dump());
+    return 0;
+  };
+}
+
+}  // namespace q3d::pipeline::cli

@@ -1,0 +1,58 @@
+#include "pipeline/config_layers.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "manifests/atomic_file.h"
+#include "pipeline/errors.h"
+#include "pipeline/json_fields.h"
+
+namespace q3d::pipeline {
+namespace {
+
+using nlohmann::json;
+namespace fs = std::filesystem;
+
+json read_json(const fs::path& file) {
+  try {
+    return json::parse(manifests::read_file(file), nullptr, true, /*ignore_comments=*/true);
+  } catch (const json::parse_error& error) {
+    throw ConfigError(fmt::format("{}: not valid JSON: {}", file.string(), error.what()));
+  } catch (const std::runtime_error& error) {
+    throw ConfigError(error.what());
+  }
+}
+
+}  // namespace
+
+ConfigLayers read_config_layers(const std::vector<fs::path>& files,
+                                const std::function<void(json&, const fs::path&)>& resolve_paths) {
+  ConfigLayers layers{json::object(), json::object(), {}};
+  for (const fs::path& file : files) {
+    json layer = read_json(file);
+    if (!layer.is_object()) throw ConfigError(file.string() + ": expected a JSON object at the top level");
+    layers.as_written.merge_patch(layer);
+    resolve_paths(layer, fs::absolute(file).parent_path());
+    layers.resolved.merge_patch(layer);
+    layers.where += (layers.where.empty() ? "" : " + ") + file.string();
+  }
+  return layers;
+}
+
+void resolve_path(json& object, const char* key, const fs::path& folder) {
+  if (object.is_object() && object.contains(key) && object[key].is_string()) {
+    object[key] = (folder / object[key].get<std::string>()).lexically_normal().string();
+  }
+}
+
+void require_one_of(const std::string& value, const std::vector<std::string>& known,
+                    const std::string& where) {
+  if (std::find(known.begin(), known.end(), value) != known.end()) return;
+  std::string list;
+  for (const auto& word : known) list += (list.empty() ? "" : ", ") + word;
+  throw ConfigError(fmt::format("{}: \"{}\" is not known; expected one of: {}. Did you mean \"{}\"?", where,
+                                value, list, nearest_word(value, known)));
+}
+
+}  // namespace q3d::pipeline

@@ -1,0 +1,71 @@
+// The configuration of a training run: one JSON file, or several laid over each other. docs/training.md
+// explains every key.
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "model/loss_weights.h"
+#include "pipeline/training/feed.h"
+
+namespace q3d::pipeline {
+
+struct TrainingNetworkConfig {
+  std::filesystem::path initial;   // checkpoint that training starts from
+  std::filesystem::path encoders;  // checkpoint whose two image encoders replace those of `initial`; or empty
+  std::filesystem::path smal_asset;  // safetensors
+  std::filesystem::path priors;      // safetensors with pose_prior_loss.* and shape_prior_loss.*
+  std::string device = "auto";
+  std::string precision = "float32";  // or bfloat16, of the forward pass
+  int compute_threads = 0;            // 0 = all cores; can change the last bits
+};
+
+struct PoolConfig {
+  std::string name;
+  std::vector<std::filesystem::path> shards;  // files and folders
+  double weight = 1.0;                        // of each sample
+};
+
+// A stretch of training with its own pools, rounds, optimiser and learning rate.
+struct PhaseConfig {
+  std::string name;
+  std::vector<PoolConfig> pools;
+  std::int64_t steps = 0;
+  int ief_iterations = 1;
+  bool adversarial = false;
+  double learning_rate = 3.75e-6;
+  std::int64_t warm_up_steps = 0;
+  std::string decay = "linear";  // to zero at the last step; or "none"
+};
+
+struct TrainingConfig {
+  TrainingNetworkConfig network;
+  std::vector<PhaseConfig> phases;  // of the chosen stage
+  FeedOptions feed;
+  int feed_ahead = 2;  // batches prepared in the background
+  model::LossWeights loss_weights;
+  model::LossVariant loss_variant = model::LossVariant::sound;
+  double weight_decay = 1e-4;
+  double largest_gradient_norm = 0.0;  // 0 = no clipping
+  double divergence_factor = 20.0;     // a loss above this times its running mean stops the run
+  std::uint64_t seed = 0;
+  std::int64_t checkpoint_every = 500;  // steps
+  std::int64_t log_every = 10;          // steps
+  nlohmann::json as_written;            // the merged JSON, paths as the user wrote them
+};
+
+// Reads the files in order; a later file's keys replace an earlier one's. Relative paths are relative to the
+// file that names them. Keeps the phases of `stage` ("1", "3"). Throws ConfigError naming file, key, got and
+// expected.
+TrainingConfig load_training_config(const std::vector<std::filesystem::path>& files,
+                                    const std::string& stage);
+
+// Checks and converts merged JSON; `where` names it in messages.
+TrainingConfig parse_training_config(const nlohmann::json& json, const std::string& where,
+                                     const std::string& stage);
+
+}  // namespace q3d::pipeline

@@ -1,0 +1,58 @@
+#include "pipeline/training/training_log.h"
+
+#include <fmt/format.h>
+
+#include <cerrno>
+#include <cstring>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <stdexcept>
+
+#include "manifests/atomic_file.h"
+
+namespace q3d::pipeline {
+namespace {
+
+// A killed process may leave half a line, which counts as none.
+bool is_at_or_before(const std::string& line, int phase, std::int64_t step) {
+  const nlohmann::json document = nlohmann::json::parse(line, nullptr, /*allow_exceptions=*/false);
+  if (!document.is_object()) return false;
+  const int line_phase = document.value("phase", 0);
+  return line_phase < phase || (line_phase == phase && document.value("step", std::int64_t{0}) <= step);
+}
+
+}  // namespace
+
+TrainingLog::TrainingLog(std::filesystem::path path, int phase, std::int64_t step) : path_(std::move(path)) {
+  std::string kept;
+  if (std::filesystem::exists(path_)) {
+    std::istringstream lines(manifests::read_file(path_));
+    for (std::string line; std::getline(lines, line);) {
+      if (is_at_or_before(line, phase, step)) kept += line + "\n";
+    }
+  }
+  manifests::write_file_atomically(path_, kept);
+  file_.reset(std::fopen(path_.c_str(), "a"));
+  if (!file_)
+    throw std::runtime_error(fmt::format("{}: cannot open: {}", path_.string(), std::strerror(errno)));
+}
+
+void TrainingLog::write(const LogLine& line) {
+  nlohmann::ordered_json terms = nlohmann::ordered_json::object();
+  for (const auto& [name, value] : line.terms) terms[name] = value;
+  const nlohmann::ordered_json document = {{"phase", line.phase},
+                                           {"phase_name", line.phase_name},
+                                           {"step", line.step},
+                                           {"loss", line.loss},
+                                           {"terms", terms},
+                                           {"gradient_norm", line.gradient_norm},
+                                           {"learning_rate", line.learning_rate},
+                                           {"samples_per_second", line.samples_per_second},
+                                           {"seconds", line.seconds}};
+  const std::string text = document.dump() + "\n";
+  if (std::fwrite(text.data(), 1, text.size(), file_.get()) != text.size() || std::fflush(file_.get()) != 0) {
+    throw std::runtime_error(fmt::format("{}: cannot write: {}", path_.string(), std::strerror(errno)));
+  }
+}
+
+}  // namespace q3d::pipeline

@@ -1,0 +1,305 @@
+#include "pipeline/training/training_run.h"
+
+#include <fmt/format.h>
+#include <torch/torch.h>
+
+#include <algorithm>
+#include <chrono>
+#include <numeric>
+#include <optional>
+#include <stdexcept>
+#include <thread>
+#include <utility>
+
+#include "manifests/atomic_file.h"
+#include "manifests/digest.h"
+#include "manifests/lock.h"
+#include "model/checkpoint.h"
+#include "model/device.h"
+#include "model/module_state.h"
+#include "model/priors.h"
+#include "model/trainer.h"
+#include "pipeline/errors.h"
+#include "pipeline/interrupt.h"
+#include "pipeline/progress.h"
+#include "pipeline/training/training_log.h"
+#include "pipeline/training/training_state.h"
+#include "pipeline/world/random.h"
+#include "smal/asset.h"
+#include "smal/body.h"
+
+namespace q3d::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+fs::path made(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) {
+    throw std::runtime_error(fmt::format("{}: cannot make the folder: {}", folder.string(), error.message()));
+  }
+  return folder;
+}
+
+model::DeviceChoice choose_device(const TrainingNetworkConfig& network) {
+  const int cores = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  model::configure_compute(network.compute_threads > 0 ? network.compute_threads : cores);
+  try {
+    return model::choose_device(network.device);
+  } catch (const std::invalid_argument& error) {
+    throw ConfigError(error.what());
+  }
+}
+
+// Tensors over the batch's arrays, which they keep alive.
+model::TrainingBatch to_tensors(FeedBatch&& from) {
+  const auto batch = std::make_shared<FeedBatch>(std::move(from));
+  const auto view = [&batch](auto* data, std::vector<std::int64_t> shape, torch::ScalarType dtype) {
+    shape.insert(shape.begin(), batch->size);
+    return torch::from_blob(
+        data, shape, [batch](void*) {}, dtype);
+  };
+  model::TrainingBatch result;
+  result.images = view(batch->images.get(), {3, 256, 256}, torch::kFloat32);
+  model::Targets& targets = result.targets;
+  targets.keypoints_2d = view(batch->keypoints_2d.data(), {26, 3}, torch::kFloat32);
+  targets.keypoints_3d = view(batch->keypoints_3d.data(), {26, 4}, torch::kFloat32);
+  targets.rotations = view(batch->rotations.data(), {35, 3, 3}, torch::kFloat32);
+  targets.betas = view(batch->betas.data(), {41}, torch::kFloat32);
+  targets.has_pose = view(batch->has_pose.data(), {}, torch::kFloat32);
+  targets.has_betas = view(batch->has_betas.data(), {}, torch::kFloat32);
+  targets.family = view(batch->family.data(), {}, torch::kInt64);
+  return result;
+}
+
+// The initial network, with the encoders of another checkpoint where the config names one.
+std::shared_ptr<model::PrimaNet> initial_net(const TrainingNetworkConfig& network,
+                                             const smal::SmalAsset& asset, torch::Device device) {
+  const smal::SafeTensors file = smal::SafeTensors::open(network.initial);
+  auto net = model::load_net(file, model::checkpoint_config(file), asset, {device, torch::kFloat32});
+  if (network.encoders.empty()) return net;
+  const torch::NoGradGuard no_grad;
+  const smal::SafeTensors encoders = smal::SafeTensors::open(network.encoders);
+  for (auto& parameter : net->named_parameters()) {
+    const std::string& name = parameter.key();
+    if (!name.starts_with("backbone.") && !name.starts_with("bioclip_embedding.species_model.")) continue;
+    const torch::Tensor stored = encoders.tensor(name);
+    if (stored.sizes() != parameter.value().sizes()) {
+      throw std::runtime_error(fmt::format("{}: {} has another shape than in {}", network.encoders.string(),
+                                           name, network.initial.string()));
+    }
+    parameter.value().copy_(stored);
+  }
+  return net;
+}
+
+// What decides the weights, but for device and threads: assets, pools and the config without the keys that
+// only steer the run.
+std::string run_key(const TrainingConfig& config, const fs::path& out) {
+  nlohmann::json settings = config.as_written;
+  for (const char* key : {"checkpoint_every", "log_every", "feed_ahead", "divergence_factor", "stages"}) {
+    settings.erase(key);
+  }
+  for (const char* key : {"device", "compute_threads"}) settings["network"].erase(key);
+  manifests::DigestCache digests(out / "digests.txt");
+  nlohmann::json assets = nlohmann::json::array();
+  const TrainingNetworkConfig& network = config.network;
+  for (const fs::path& path : {network.initial, network.encoders, network.smal_asset, network.priors}) {
+    assets.push_back(path.empty() ? std::string() : digests.digest(path));
+  }
+  digests.save();
+  nlohmann::json phases = nlohmann::json::array();
+  for (const PhaseConfig& phase : config.phases) {
+    nlohmann::json pools = nlohmann::json::array();
+    for (const PoolConfig& pool : phase.pools) {
+      pools.push_back({pool.name, ShardPool(pool.name, pool.shards).size(), pool.weight});
+    }
+    phases.push_back({phase.name, phase.steps, phase.ief_iterations, phase.adversarial, phase.learning_rate,
+                      phase.warm_up_steps, phase.decay, pools});
+  }
+  return manifests::sha256(nlohmann::json{settings, assets, phases}.dump());
+}
+
+model::TrainerOptions trainer_options(const TrainingConfig& config, const PhaseConfig& phase) {
+  model::TrainerOptions options;
+  options.weights = config.loss_weights;
+  options.variant = config.loss_variant;
+  options.adamw.weight_decay = config.weight_decay;
+  options.schedule = {phase.learning_rate, phase.warm_up_steps, phase.decay == "linear" ? phase.steps : 0};
+  options.largest_gradient_norm = config.largest_gradient_norm;
+  options.precision =
+      config.network.precision == "bfloat16" ? model::Precision::bfloat16 : model::Precision::float32;
+  options.adversarial = phase.adversarial;
+  options.seed = config.seed;
+  return options;
+}
+
+// One number for the draws of a phase and for LibTorch's generators at its start.
+std::uint64_t phase_seed(const TrainingConfig& config, int phase_index) {
+  return world::Rng(config.seed, {static_cast<std::uint64_t>(phase_index)}).next();
+}
+
+Feed open_feed(const TrainingConfig& config, const PhaseConfig& phase, int phase_index, int threads) {
+  std::vector<ShardPool> pools;
+  std::vector<double> weights;
+  for (const PoolConfig& pool : phase.pools) {
+    pools.emplace_back(pool.name, pool.shards);
+    weights.push_back(pool.weight);
+  }
+  FeedOptions options = config.feed;
+  options.threads = threads;
+  try {
+    // Phases draw from different streams.
+    return {std::move(pools), weights, options, phase_seed(config, phase_index)};
+  } catch (const std::invalid_argument& error) {
+    throw ConfigError(fmt::format("phase \"{}\": {}", phase.name, error.what()));
+  }
+}
+
+class Run {
+ public:
+  Run(const TrainingConfig& config, const TrainingOptions& options)
+      : config_(config),
+        options_(options),
+        lock_(made(options.out)),
+        device_(choose_device(config.network)),
+        asset_(smal::load_asset(config.network.smal_asset)),
+        priors_(model::load_priors(smal::SafeTensors::open(config.network.priors), device_.device)),
+        key_(run_key(config, options.out)),
+        stored_(load_state(state_path(), key_)) {
+    manifests::remove_temporaries(options.out);
+    if (stored_) position_ = stored_->position;
+    if (options.quiet) return;
+    if (!device_.warning.empty()) fmt::print(stderr, "warning: {}\n", device_.warning);
+    fmt::print(stderr, "training on {}\n", device_.description);
+    if (stored_) {
+      fmt::print(stderr, "going on at step {} of phase {}\n", position_.step, position_.phase + 1);
+    }
+  }
+
+  TrainingSummary run() {
+    TrainingSummary summary;
+    for (const PhaseConfig& phase : config_.phases) summary.steps_total += phase.steps;
+    TrainingLog log(options_.out / "log.jsonl", position_.phase, position_.step);
+    Progress progress("trained steps", summary.steps_total, options_.quiet);
+    progress.advance(steps_done(), /*from_earlier_run=*/true);
+    auto net = initial_net(config_.network, asset_, device_.device);
+    if (stored_) model::restore_parameters(stored_->file, "", *net);
+    while (position_.phase < static_cast<int>(config_.phases.size()) && !limit_reached(summary)) {
+      net = run_phase(net, log, progress, summary);
+    }
+    summary.steps_done = steps_done();
+    summary.finished = position_.phase == static_cast<int>(config_.phases.size());
+    summary.seconds = seconds_since(start_);
+    if (summary.finished) summary.model = write_model(*net);
+    return summary;
+  }
+
+ private:
+  fs::path state_path() const { return options_.out / "state.safetensors"; }
+
+  std::int64_t steps_done() const {
+    std::int64_t done = position_.step;
+    for (int i = 0; i < position_.phase; ++i) done += config_.phases[static_cast<std::size_t>(i)].steps;
+    return done;
+  }
+
+  bool limit_reached(const TrainingSummary& summary) const {
+    return options_.max_steps > 0 && summary.steps_here >= options_.max_steps;
+  }
+
+  // The present phase, from the present step, to its end or until this call must stop.
+  std::shared_ptr<model::PrimaNet> run_phase(const std::shared_ptr<model::PrimaNet>& from, TrainingLog& log,
+                                             Progress& progress, TrainingSummary& summary) {
+    const PhaseConfig& phase = config_.phases[static_cast<std::size_t>(position_.phase)];
+    model::PrimaConfig sizes = from->config();
+    sizes.ief_iterations = phase.ief_iterations;
+    const auto net = model::with_config(*from, sizes);
+    torch::manual_seed(phase_seed(config_, position_.phase));
+    model::Trainer trainer(net, smal::SmalBody(asset_, device_.device), priors_,
+                           trainer_options(config_, phase));
+    if (stored_ && position_.step > 0) trainer.restore(stored_->file);
+    stored_.reset();
+    const Feed feed = open_feed(config_, phase, position_.phase, options_.threads);
+    FeedStream stream(feed, position_.step * feed.batch_size(), config_.feed_ahead);
+    while (position_.step < phase.steps) {
+      if (interrupted()) {
+        save_state(state_path(), trainer, position_, key_);
+        throw Interrupted("interrupted");
+      }
+      if (limit_reached(summary)) break;
+      step(phase, trainer, feed, stream.next(), log, summary);
+      progress.advance(1);
+      if (position_.step % config_.checkpoint_every == 0 && position_.step < phase.steps) {
+        save_state(state_path(), trainer, position_, key_);
+      }
+    }
+    if (position_.step == phase.steps) position_ = {position_.phase + 1, 0, {}};
+    save_state(state_path(), trainer, position_, key_);
+    return net;
+  }
+
+  void step(const PhaseConfig& phase, model::Trainer& trainer, const Feed& feed, FeedBatch&& batch,
+            TrainingLog& log, TrainingSummary& summary) {
+    const std::int64_t first_draw = batch.first_draw;
+    const model::StepReport report = trainer.step(to_tensors(std::move(batch)));
+    const auto fault = position_.watch.check(report.loss, report.gradient_norm, config_.divergence_factor);
+    if (fault) stop(phase, *fault, report, feed.ids(first_draw));
+    ++position_.step;
+    ++summary.steps_here;
+    summary.last_loss = report.loss;
+    if (position_.step % config_.log_every != 0 && position_.step != phase.steps) return;
+    const double seconds = seconds_since(start_);
+    log.write({position_.phase, phase.name, position_.step, report.loss, report.gradient_norm,
+               report.learning_rate,
+               static_cast<double>(summary.steps_here * feed.batch_size()) / std::max(seconds, 1e-9), seconds,
+               report.terms});
+  }
+
+  [[noreturn]] void stop(const PhaseConfig& phase, const std::string& fault, const model::StepReport& report,
+                         const std::vector<std::string>& ids) const {
+    std::string message = fmt::format(
+        "training stopped at step {} of phase \"{}\": {}\nthe terms of the loss:", position_.step + 1,
+        phase.name, fault);
+    for (const auto& [name, value] : report.terms) message += fmt::format(" {} {};", name, value);
+    message += "\nthe batch's samples:";
+    for (const std::string& id : ids) message += "\n  " + id;
+    message += fmt::format(
+        "\n{} holds the last good state; a lower learning_rate or a largest_gradient_norm may help",
+        state_path().string());
+    throw std::runtime_error(message);
+  }
+
+  fs::path write_model(const model::PrimaNet& net) const {
+    const fs::path path = options_.out / "model.safetensors";
+    smal::NamedTensors tensors;
+    model::append_parameters(tensors, "", net);
+    model::write_checkpoint(path, net.config(), tensors);
+    return path;
+  }
+
+  const TrainingConfig& config_;
+  const TrainingOptions& options_;
+  Clock::time_point start_ = Clock::now();
+  manifests::FolderLock lock_;
+  model::DeviceChoice device_;
+  smal::SmalAsset asset_;
+  model::Priors priors_;
+  std::string key_;
+  std::optional<StoredState> stored_;
+  TrainingPosition position_;
+};
+
+}  // namespace
+
+TrainingSummary train(const TrainingConfig& config, const TrainingOptions& options) {
+  return Run(config, options).run();
+}
+
+}  // namespace q3d::pipeline

@@ -1,0 +1,41 @@
+// Trains a network from shards: all phases of a stage, resumable at any step. Paper section "Model training".
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+#include "pipeline/training/training_config.h"
+
+namespace q3d::pipeline {
+
+struct TrainingOptions {
+  std::filesystem::path out;
+  int threads = 0;             // that prepare batches; 0 = all cores. Changes no bit
+  std::int64_t max_steps = 0;  // of this call; then the state is saved and train() returns. 0 = no limit
+  bool quiet = false;
+};
+
+struct TrainingSummary {
+  std::int64_t steps_done = 0;  // of all phases, earlier processes included
+  std::int64_t steps_total = 0;
+  bool finished = false;
+  std::int64_t steps_here = 0;  // by this call
+  double seconds = 0.0;
+  double last_loss = 0.0;       // of this call's last step
+  std::filesystem::path model;  // the weights, once finished
+};
+
+// Writes into `out`:
+//   state.safetensors   the newest state: weights under their official names, optimisers, generators,
+//   position.
+//                       Replaced as a whole; usable as a checkpoint.
+//   log.jsonl           see docs/training.md
+//   model.safetensors   the weights alone, when the last phase is done
+// A run that was stopped or killed goes on from the newest state, with the weights that it would have had
+// anyway (same device, same compute threads). Throws ConfigError when `out` holds another configuration's
+// run, Interrupted on Ctrl-C after saving the state, and std::runtime_error naming the batch's sample ids
+// when loss or gradient are not finite or the loss diverges; the newest state then stays as it is.
+TrainingSummary train(const TrainingConfig& config, const TrainingOptions& options);
+
+}  // namespace q3d::pipeline

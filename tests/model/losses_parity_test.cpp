@@ -1,0 +1,252 @@
+// Losses, gradients and optimiser steps against the official code's.
+#include "model/losses.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "model/assemble.h"
+#include "model/net.h"
+#include "model/optimiser.h"
+#include "smal/rotation.h"
+#include "tests/model/parity_net.h"
+#include "tests/support/paths.h"
+
+namespace q3d::model {
+namespace {
+
+using testing::parity_file;
+
+Targets targets_of(const smal::SafeTensors& file) {
+  Targets targets;
+  targets.keypoints_2d = file.tensor("batch_keypoints_2d");
+  targets.keypoints_3d = file.tensor("batch_keypoints_3d");
+  const torch::Tensor axis_angle =
+      torch::cat({file.tensor("batch_smal_global_orient"), file.tensor("batch_smal_pose")}, 1);
+  targets.rotations = smal::axis_angle_to_matrix(axis_angle.unflatten(1, {35, 3}));
+  targets.betas = file.tensor("batch_smal_betas");
+  targets.has_pose = file.tensor("batch_has_pose");
+  targets.has_betas = file.tensor("batch_has_betas");
+  targets.family = file.tensor("batch_category").to(torch::kInt64);
+  return targets;
+}
+
+nlohmann::json meta_of(const std::string& name) {
+  std::ifstream stream(testing::parity_dir() / (name + ".json"));
+  return nlohmann::json::parse(stream).at("meta");
+}
+
+LossWeights weights_of(const nlohmann::json& meta) {
+  const nlohmann::json& official = meta.at("loss_weights");
+  LossWeights weights;
+  weights.keypoints_3d = official.at("KEYPOINTS_3D");
+  weights.keypoints_2d = official.at("KEYPOINTS_2D");
+  weights.aux_keypoints_2d = official.at("INTERMEDIATE_KP2D");
+  weights.aux_keypoints_3d = official.at("INTERMEDIATE_KP3D");
+  weights.global_orient = official.at("GLOBAL_ORIENT");
+  weights.pose = official.at("POSE");
+  weights.betas = official.at("BETAS");
+  weights.contrastive = official.at("SUPCON");
+  weights.adversarial = official.at("ADVERSARIAL");
+  return weights;
+}
+
+// The network of the golden numbers, trainable, without dropout or stochastic depth.
+class LossesParity : public ::testing::TestWithParam<std::string> {
+ protected:
+  LossesParity()
+      : config_(still(testing::parity_config(GetParam()))),
+        prima_(testing::parity_prima(GetParam(), config_)),
+        groups_(parameter_groups(prima_.net())),
+        file_(parity_file("losses_" + GetParam())),
+        meta_(meta_of("losses_" + GetParam())),
+        priors_(load_priors(parity_file("weights_" + GetParam()), torch::kCPU)),
+        images_(testing::parity_images(prima_, torch::arange(6))) {
+    prima_.net().train();
+  }
+
+  static PrimaConfig still(PrimaConfig config) {
+    config.dropout = 0.0;
+    config.drop_path = 0.0;
+    return config;
+  }
+
+  Prediction predict() const {
+    const PrimaNet& net = prima_.net();
+    const ImageFeatures features = net.encode(images_);
+    const torch::Tensor betas = net.decoder().initial_betas(features.bio_token);
+    const DecoderOutput output = net.decoder().refine(net.decoder().remember(features.image_tokens), betas,
+                                                      net.decoder().own_parameters());
+    return assemble(net, prima_.body(), output, betas, /*with_vertices=*/false);
+  }
+
+  torch::Tensor loss(LossVariant variant = LossVariant::official) const {
+    return total_loss(loss_terms(predict(), targets_of(file_), priors_, variant), weights_of(meta_));
+  }
+
+  void expect_terms(const std::string& prefix, const LossTerms& terms) const {
+    const torch::Tensor half_prior = 0.5 * terms.pose_prior.value();
+    const std::map<std::string, torch::Tensor> by_name = {
+        {"loss_keypoints_2d", terms.keypoints_2d},
+        {"loss_keypoints_3d", terms.keypoints_3d},
+        {"loss_inter_keypoints_2d", terms.aux_keypoints_2d},
+        {"loss_inter_keypoints_3d", terms.aux_keypoints_3d},
+        {"param_global_orient", terms.global_orient},
+        {"param_pose", terms.pose},
+        {"param_betas", terms.betas},
+        {"pose_prior", terms.pose_prior.value()},
+        {"shape_prior", terms.shape_prior.value()},
+        {"shape_prior_init", terms.initial_shape_prior.value()},
+        {"loss_global_orient", terms.global_orient + half_prior},
+        {"loss_pose", terms.pose + half_prior},
+        {"loss_betas", terms.betas + terms.shape_prior.value() + 0.5 * terms.initial_shape_prior.value()},
+        {"loss_supcon", terms.contrastive.value()},
+        {"loss", total_loss(terms, weights_of(meta_))}};
+    for (const auto& [name, got] : by_name) {
+      const double expected = file_.tensor(prefix + name).item<double>();
+      EXPECT_NEAR(got.item<double>(), expected, 1e-5 * std::abs(expected)) << prefix << name;
+    }
+  }
+
+  const torch::Tensor& parameter(const std::string& name) const {
+    for (const ParameterGroup& group : groups_) {
+      for (const auto& [key, tensor] : group.parameters) {
+        if (key == name) return tensor;
+      }
+    }
+    throw std::out_of_range(name);
+  }
+
+  PrimaConfig config_;
+  Prima prima_;
+  std::vector<ParameterGroup> groups_;
+  smal::SafeTensors file_;
+  nlohmann::json meta_;
+  Priors priors_;
+  torch::Tensor images_;
+};
+
+TEST_P(LossesParity, EachTerm) {
+  const torch::NoGradGuard no_grad;
+  expect_terms("term_", loss_terms(predict(), targets_of(file_), priors_, LossVariant::official));
+}
+
+TEST_P(LossesParity, EachTermWhenAllSamplesHaveTruth) {
+  const torch::NoGradGuard no_grad;
+  Targets targets = targets_of(file_);
+  targets.has_pose = torch::ones_like(targets.has_pose);
+  targets.has_betas = torch::ones_like(targets.has_betas);
+  expect_terms("allgt_term_", loss_terms(predict(), targets, priors_, LossVariant::official));
+}
+
+TEST_P(LossesParity, SoundVariantHasTheSameValueAndGradients) {
+  loss(LossVariant::sound).backward();
+  const auto names = meta_.at("param_names").get<std::vector<std::string>>();
+  const torch::Tensor norms = file_.tensor("grad_norms");
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const double expected = norms[static_cast<std::int64_t>(i)].item<double>();
+    EXPECT_NEAR(parameter(names[i]).grad().norm().item<double>(), expected, 1e-4 * expected + 1e-7)
+        << names[i];
+  }
+}
+
+TEST_P(LossesParity, Gradients) {
+  loss().backward();
+  const auto names = meta_.at("param_names").get<std::vector<std::string>>();
+  const torch::Tensor norms = file_.tensor("grad_norms");
+  ASSERT_EQ(norms.size(0), static_cast<std::int64_t>(names.size()));
+  std::size_t trained = 0;
+  for (const ParameterGroup& group : groups_) trained += group.parameters.size();
+  EXPECT_EQ(trained, names.size());
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const double expected = norms[static_cast<std::int64_t>(i)].item<double>();
+    EXPECT_NEAR(parameter(names[i]).grad().norm().item<double>(), expected, 1e-5 * expected + 1e-7)
+        << names[i];
+  }
+  for (const std::string& name : file_.names()) {
+    if (!name.starts_with("grad_") || name == "grad_norms") continue;
+    const torch::Tensor expected = file_.tensor(name);
+    testing::expect_close(name, parameter(name.substr(5)).grad(), expected,
+                          1e-5 * expected.abs().max().item<double>());
+  }
+}
+
+// True where the gradient is zero in theory, so that AdamW moves an element by its learning rate with the
+// sign of a rounding error: the key third of an attention's input bias, and the common shift of centred 3D
+// keypoints.
+torch::Tensor is_noise(const std::string& name, const torch::Tensor& tensor) {
+  torch::Tensor noise = torch::zeros_like(tensor, torch::kBool);
+  if (name.ends_with("qkv.bias") || name.ends_with("in_proj_bias")) {
+    const std::int64_t width = tensor.size(0) / 3;
+    noise.narrow(0, width, width).fill_(true);
+  }
+  if (name.ends_with("kp3d_from_tokens.2.bias")) noise.fill_(true);
+  return noise;
+}
+
+TEST_P(LossesParity, ThreeOptimiserSteps) {
+  const nlohmann::json& adamw = meta_.at("adamw");
+  ASSERT_EQ(adamw.at("groups").size(), groups_.size());
+  for (std::size_t i = 0; i < groups_.size(); ++i) {
+    EXPECT_EQ(adamw.at("groups")[i].at("n_tensors"), groups_[i].parameters.size());
+    EXPECT_DOUBLE_EQ(adamw.at("groups")[i].at("lr").get<double>() / adamw.at("lr").get<double>(),
+                     groups_[i].rate_scale);
+  }
+  std::map<std::string, torch::Tensor> before;
+  for (const ParameterGroup& group : groups_) {
+    for (const auto& [name, tensor] : group.parameters) before[name] = tensor.detach().clone();
+  }
+  AdamW optimiser(groups_, {});
+  const torch::Tensor losses = file_.tensor("adamw_losses");
+  const auto exact_losses = meta_.at("adamw_losses_fp64").get<std::vector<double>>();
+  for (std::int64_t step = 0; step < 3; ++step) {
+    optimiser.zero_grad();
+    const torch::Tensor now = loss();
+    // The parameters' noise shows in the later losses: as far as float32 is from float64 there.
+    const double expected = losses[step].item<double>();
+    const double noise = 2.0 * std::abs(expected - exact_losses[static_cast<std::size_t>(step)]);
+    EXPECT_NEAR(now.item<double>(), expected, 1e-5 * expected + noise);
+    now.backward();
+    optimiser.step(adamw.at("lr"));
+  }
+  const nlohmann::json& noise_table = meta_.at("adamw_fp32_vs_fp64_per_param_max_mean_frac_gt_1e5");
+  std::size_t compared = 0;
+  for (const std::string& name : file_.names()) {
+    const bool thinned = name.starts_with("adamw3s7_");
+    if (!thinned && !name.starts_with("adamw3_")) continue;
+    ++compared;
+    const std::string key = name.substr(thinned ? 9 : 7);
+    const auto thin = [&](const torch::Tensor& tensor) {
+      return thinned ? tensor.flatten().slice(0, 0, std::nullopt, 7) : tensor.flatten();
+    };
+    const torch::Tensor kept = thin(is_noise(key, parameter(key))).logical_not();
+    const torch::Tensor expected = file_.tensor(name).flatten();
+    const torch::Tensor got = thin(parameter(key).detach());
+    ASSERT_EQ(got.sizes(), expected.sizes()) << key;
+    if (!kept.any().item<bool>()) continue;
+    const torch::Tensor difference = (got - expected).abs().masked_select(kept);
+    // Two float32 runs each differ from float64 by up to the table's numbers.
+    const double largest = noise_table.at(key)[0];
+    const double mean = noise_table.at(key)[1];
+    EXPECT_LE(difference.max().item<double>(), 2.0 * largest + 1e-6) << key;
+    EXPECT_LE(difference.mean().item<double>(), 2.0 * mean) << key;
+    // An optimiser that does nothing must not pass.
+    const torch::Tensor moved = (expected - thin(before.at(key))).abs().masked_select(kept);
+    EXPECT_GT(moved.mean().item<double>(), 20.0 * difference.mean().item<double>()) << key;
+  }
+  EXPECT_EQ(compared, meta_.at("param_names").size());
+}
+
+TEST_P(LossesParity, ContrastiveLossOfGivenFeatures) {
+  const torch::Tensor labels = file_.tensor("supcon_labels").to(torch::kInt64);
+  const double got = contrastive_loss(file_.tensor("supcon_feat"), labels).value().item<double>();
+  EXPECT_NEAR(got, file_.tensor("supcon_loss").item<double>(), 1e-5 * got);
+}
+
+INSTANTIATE_TEST_SUITE_P(Networks, LossesParity, ::testing::Values("A", "B"));
+
+}  // namespace
+}  // namespace q3d::model

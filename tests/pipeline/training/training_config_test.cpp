@@ -1,0 +1,157 @@
+#include "pipeline/training/training_config.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "pipeline/errors.h"
+#include "tests/support/paths.h"
+
+namespace q3d::pipeline {
+namespace {
+
+using nlohmann::json;
+
+json good() {
+  return json::parse(R"({
+    "network": {"initial": "i.safetensors", "encoders": "e.safetensors", "smal_asset": "s.safetensors",
+                "priors": "p.safetensors", "device": "cpu", "precision": "bfloat16", "compute_threads": 2},
+    "pools": {"animal3d": {"shards": ["a"]}, "ctrlani3d": {"shards": ["b", "c"], "weight": 0.5}},
+    "stages": {
+      "1": [{"name": "warm-up", "pools": ["animal3d"], "steps": 10, "ief_iterations": 3, "adversarial": true,
+             "learning_rate": 0.01, "warm_up_steps": 2, "decay": "none"},
+            {"name": "joint", "pools": ["animal3d", "ctrlani3d"], "steps": 20}],
+      "3": [{"name": "only", "pools": ["ctrlani3d"], "steps": 5}]},
+    "batch": 4, "feed_ahead": 1, "augment": false, "keypoint_weight": "raw_v",
+    "augmentation": {"scale": 0.1, "rotation_deg": 10, "rotation_rate": 0.2, "shift": 0.01, "colour": 0.3},
+    "loss_weights": {"keypoints_3d": 1, "keypoints_2d": 2, "aux_keypoints_2d": 3, "aux_keypoints_3d": 4,
+                     "global_orient": 5, "pose": 6, "betas": 7, "contrastive": 8, "adversarial": 9},
+    "loss_variant": "official", "weight_decay": 0.1, "largest_gradient_norm": 1, "divergence_factor": 5,
+    "seed": 11, "checkpoint_every": 7, "log_every": 3})");
+}
+
+TEST(TrainingConfig, ReadsEveryKey) {
+  const TrainingConfig config = parse_training_config(good(), "t", "1");
+  EXPECT_EQ(config.network.encoders, "e.safetensors");
+  EXPECT_EQ(config.network.precision, "bfloat16");
+  EXPECT_EQ(config.network.compute_threads, 2);
+  ASSERT_EQ(config.phases.size(), 2U);
+  const PhaseConfig& warm_up = config.phases[0];
+  EXPECT_EQ(warm_up.name, "warm-up");
+  EXPECT_EQ(warm_up.steps, 10);
+  EXPECT_EQ(warm_up.ief_iterations, 3);
+  EXPECT_TRUE(warm_up.adversarial);
+  EXPECT_DOUBLE_EQ(warm_up.learning_rate, 0.01);
+  EXPECT_EQ(warm_up.warm_up_steps, 2);
+  EXPECT_EQ(warm_up.decay, "none");
+  ASSERT_EQ(config.phases[1].pools.size(), 2U);
+  EXPECT_EQ(config.phases[1].ief_iterations, 1);
+  EXPECT_DOUBLE_EQ(config.phases[1].pools[1].weight, 0.5);
+  EXPECT_EQ(config.phases[1].pools[1].shards.size(), 2U);
+  EXPECT_EQ(config.feed.batch, 4);
+  EXPECT_FALSE(config.feed.augment);
+  EXPECT_EQ(config.feed.keypoint_weight, KeypointWeight::raw_v);
+  EXPECT_DOUBLE_EQ(config.feed.augmentation.colour, 0.3);
+  EXPECT_DOUBLE_EQ(config.loss_weights.contrastive, 8.0);
+  EXPECT_EQ(config.loss_variant, model::LossVariant::official);
+  EXPECT_DOUBLE_EQ(config.divergence_factor, 5.0);
+  EXPECT_EQ(config.seed, 11U);
+  EXPECT_EQ(config.checkpoint_every, 7);
+  EXPECT_EQ(parse_training_config(good(), "t", "3").phases[0].name, "only");
+}
+
+TEST(TrainingConfig, DefaultsAreTheOfficialOnes) {
+  json config = good();
+  for (const char* key : {"batch", "augmentation", "loss_weights", "loss_variant", "weight_decay", "augment",
+                          "keypoint_weight", "largest_gradient_norm"}) {
+    config.erase(key);
+  }
+  const TrainingConfig parsed = parse_training_config(config, "t", "1");
+  EXPECT_EQ(parsed.feed.batch, 48);
+  EXPECT_TRUE(parsed.feed.augment);
+  EXPECT_DOUBLE_EQ(parsed.feed.augmentation.rotation_rate, 0.6);
+  EXPECT_DOUBLE_EQ(parsed.loss_weights.keypoints_3d, 0.05);
+  EXPECT_DOUBLE_EQ(parsed.weight_decay, 1e-4);
+  EXPECT_DOUBLE_EQ(parsed.largest_gradient_norm, 0.0);
+  EXPECT_DOUBLE_EQ(parsed.phases[1].learning_rate, 3.75e-6);
+  EXPECT_EQ(parsed.phases[1].decay, "linear");
+  EXPECT_EQ(parsed.loss_variant, model::LossVariant::sound);
+}
+
+struct Mutation {
+  const char* pointer;
+  const char* value;
+  const char* expected;  // part of the message
+};
+
+class BrokenTrainingConfig : public ::testing::TestWithParam<Mutation> {};
+
+TEST_P(BrokenTrainingConfig, IsRefusedWithTheReason) {
+  json config = good();
+  config[json::json_pointer(GetParam().pointer)] = json::parse(GetParam().value);
+  try {
+    parse_training_config(config, "t", "1");
+    FAIL() << "accepted " << GetParam().pointer << " = " << GetParam().value;
+  } catch (const ConfigError& error) {
+    EXPECT_NE(std::string(error.what()).find(GetParam().expected), std::string::npos) << error.what();
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Keys, BrokenTrainingConfig,
+    ::testing::Values(
+        Mutation{"/bach", "1", "did you mean \"batch\"?"}, Mutation{"/batch", "0", "1 to 65536"},
+        Mutation{"/network/initial", "3", "must be"},
+        Mutation{"/network/precision", "\"float16\"", "float32, bfloat16"},
+        Mutation{"/network/compute_threads", "-1", "0 (all cores) or more"},
+        Mutation{"/pools", "{}", "at least one"}, Mutation{"/pools/animal3d/shards", "[]", "at least one"},
+        Mutation{"/pools/animal3d/shards", "[1]", "list of texts"},
+        Mutation{"/pools/animal3d/weight", "-1", "0 or more"},
+        Mutation{"/pools/animal3d/wieght", "1", "did you mean \"weight\"?"},
+        Mutation{"/stages", "{\"2\": []}", "expected one of: 2"}, Mutation{"/stages/1", "[]", "at least one"},
+        Mutation{"/stages/1/0/pools", "[\"anmal3d\"]", "Did you mean \"animal3d\"?"},
+        Mutation{"/stages/1/0/steps", "0", "at least 1"},
+        Mutation{"/stages/1/0/warm_up_steps", "10", "less than \"steps\""},
+        Mutation{"/stages/1/0/ief_iterations", "0", "1 to 16"},
+        Mutation{"/stages/1/0/learning_rate", "0", "greater than 0"},
+        Mutation{"/stages/1/0/decay", "\"cosine\"", "linear, none"},
+        Mutation{"/stages/1/0/stps", "1", "did you mean \"steps\"?"},
+        Mutation{"/feed_ahead", "-1", "0 to 64"}, Mutation{"/keypoint_weight", "\"v\"", "label, raw_v"},
+        Mutation{"/augmentation/scale", "1", "less than 1"},
+        Mutation{"/augmentation/rotation_rate", "2", "0 to 1"},
+        Mutation{"/augmentation/flip", "true", "unknown key"},
+        Mutation{"/loss_weights/pse", "1", "did you mean \"pose\"?"},
+        Mutation{"/loss_variant", "\"x\"", "sound, official"}, Mutation{"/weight_decay", "-1", "0 or more"},
+        Mutation{"/largest_gradient_norm", "-1", "no clipping"},
+        Mutation{"/divergence_factor", "1", "greater than 1"}, Mutation{"/seed", "-1", "seed"},
+        Mutation{"/checkpoint_every", "0", "at least 1"}, Mutation{"/log_every", "0", "at least 1"}));
+
+TEST(TrainingConfig, AMissingPartIsNamed) {
+  for (const char* key : {"network", "pools", "stages"}) {
+    json config = good();
+    config.erase(key);
+    try {
+      parse_training_config(config, "t", "1");
+      FAIL() << key;
+    } catch (const ConfigError& error) {
+      EXPECT_NE(std::string(error.what()).find(std::string("\"") + key + "\" is missing"), std::string::npos)
+          << error.what();
+    }
+  }
+}
+
+TEST(TrainingConfig, PathsAreRelativeToTheirFile) {
+  const testing::ScratchDir scratch;
+  std::filesystem::create_directories(scratch.path() / "layer");
+  std::ofstream(scratch.path() / "base.json") << good().dump();
+  std::ofstream(scratch.path() / "layer/top.json") << R"({"pools": {"animal3d": {"shards": ["x"]}}})";
+  const TrainingConfig config =
+      load_training_config({scratch.path() / "base.json", scratch.path() / "layer/top.json"}, "1");
+  EXPECT_EQ(config.network.priors, scratch.path() / "p.safetensors");
+  EXPECT_EQ(config.phases[0].pools[0].shards[0], scratch.path() / "layer/x");
+  EXPECT_EQ(config.phases[1].pools[1].shards[1], scratch.path() / "c");
+  EXPECT_EQ(config.as_written["network"]["priors"], "p.safetensors");
+}
+
+}  // namespace
+}  // namespace q3d::pipeline

@@ -1,0 +1,149 @@
+#include "pipeline/training/training_run.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <limits>
+
+#include "manifests/atomic_file.h"
+#include "model/checkpoint.h"
+#include "model/prima.h"
+#include "pipeline/errors.h"
+#include "smal/asset.h"
+#include "tests/pipeline/training/sample_shards.h"
+#include "tests/support/parity_smal.h"
+#include "tests/support/paths.h"
+
+namespace q3d::pipeline {
+namespace {
+
+using ::testing::HasSubstr;
+
+class TrainingRun : public ::testing::Test {
+ protected:
+  TrainingRun() {
+    model::PrimaConfig sizes = model::named_config("tiny");
+    sizes.embed_dim = 32, sizes.heads = 2;
+    sizes.clip_width = 32, sizes.clip_layers = 1, sizes.clip_heads = 2, sizes.clip_out = 16;
+    sizes.dec_dim = 32, sizes.dec_heads = 2, sizes.dec_ffn = 32;
+    sizes.drop_path = 0.3;
+    model::write_initial_checkpoint(path("initial"), sizes, 3);
+    smal::save_asset(path("asset"), testing::load_parity_asset(testing::parity_dir()));
+    testing::write_sample_shard(path("first.h5"), "first", 5, 10);
+    testing::write_sample_shard(path("second.h5"), "second", 7, 40);
+    config_.network.initial = path("initial");
+    config_.network.smal_asset = path("asset");
+    config_.network.priors = testing::parity_dir() / "weights_A.safetensors";
+    config_.network.device = "cpu";
+    config_.network.compute_threads = 1;
+    const PoolConfig first{"first", {path("first.h5")}, 1.0};
+    const PoolConfig second{"second", {path("second.h5")}, 0.15};
+    config_.phases = {{"warm-up", {first}, 3, 2, true, 1e-3, 1, "linear"},
+                      {"joint", {first, second}, 3, 1, false, 1e-3, 0, "linear"}};
+    config_.feed.batch = 2;
+    config_.seed = 17;
+    config_.checkpoint_every = 2;
+    config_.log_every = 1;
+    config_.as_written = {{"network", nlohmann::json::object()}, {"seed", 17}};
+  }
+
+  std::filesystem::path path(const std::string& name) const { return scratch_.path() / name; }
+
+  TrainingSummary run(const std::string& out, std::int64_t max_steps = 0, int threads = 1) const {
+    return train(config_, {path(out), threads, max_steps, /*quiet=*/true});
+  }
+
+  testing::ScratchDir scratch_;
+  TrainingConfig config_;
+};
+
+TEST_F(TrainingRun, StoppedAnywhereItEndsWithTheSameWeights) {
+  const TrainingSummary straight = run("straight");
+  EXPECT_TRUE(straight.finished);
+  EXPECT_EQ(straight.steps_done, 6);
+  // Stops inside the first phase, after its last step, and inside the second; other threads, other
+  // read-ahead.
+  EXPECT_FALSE(run("stopped", 1).finished);
+  config_.feed_ahead = 0;
+  EXPECT_EQ(run("stopped", 2, 3).steps_done, 3);
+  EXPECT_EQ(run("stopped", 2).steps_done, 5);
+  const TrainingSummary last = run("stopped");
+  EXPECT_TRUE(last.finished);
+  EXPECT_EQ(last.steps_here, 1);
+  EXPECT_EQ(manifests::read_file(straight.model), manifests::read_file(last.model));
+  EXPECT_EQ(manifests::read_file(path("straight/state.safetensors")),
+            manifests::read_file(path("stopped/state.safetensors")));
+}
+
+TEST_F(TrainingRun, AKilledRunRepeatsStepsAfterItsNewestState) {
+  const TrainingSummary straight = run("straight");
+  run("killed", 2);
+  std::filesystem::copy_file(path("killed/state.safetensors"), path("old"));
+  run("killed", 1);
+  // As if the process had died before it saved step 3.
+  std::filesystem::rename(path("old"), path("killed/state.safetensors"));
+  const TrainingSummary last = run("killed");
+  EXPECT_EQ(manifests::read_file(straight.model), manifests::read_file(last.model));
+  std::ifstream log(path("killed/log.jsonl"));
+  std::vector<std::pair<int, int>> steps;
+  for (std::string line; std::getline(log, line);) {
+    const auto document = nlohmann::json::parse(line);
+    steps.emplace_back(document.at("phase"), document.at("step"));
+  }
+  EXPECT_THAT(steps, ::testing::ElementsAre(std::pair(0, 1), std::pair(0, 2), std::pair(0, 3),
+                                            std::pair(1, 1), std::pair(1, 2), std::pair(1, 3)));
+}
+
+TEST_F(TrainingRun, TheWeightsLoadAsACheckpoint) {
+  const TrainingSummary summary = run("out");
+  const model::Prima prima = model::Prima::load(summary.model, path("asset"), torch::kCPU);
+  EXPECT_EQ(prima.config().ief_iterations, 1);
+  const smal::SafeTensors before = smal::SafeTensors::open(path("initial"));
+  const smal::SafeTensors after = smal::SafeTensors::open(summary.model);
+  EXPECT_FALSE(
+      torch::equal(before.tensor("smal_head.decpose.2.weight"), after.tensor("smal_head.decpose.2.weight")));
+  EXPECT_NO_THROW(model::Prima::load(path("out/state.safetensors"), path("asset"), torch::kCPU));
+}
+
+TEST_F(TrainingRun, AFinishedRunHasNothingToDo) {
+  const std::string first = manifests::read_file(run("out").model);
+  const TrainingSummary again = run("out");
+  EXPECT_TRUE(again.finished);
+  EXPECT_EQ(again.steps_here, 0);
+  EXPECT_EQ(manifests::read_file(again.model), first);
+}
+
+TEST_F(TrainingRun, AnotherConfigurationNeedsAnotherFolder) {
+  run("out", 1);
+  config_.phases[0].learning_rate = 1e-4;
+  EXPECT_THROW(run("out"), ConfigError);
+}
+
+TEST_F(TrainingRun, EncodersMayComeFromAnotherCheckpoint) {
+  model::PrimaConfig sizes = model::checkpoint_config(smal::SafeTensors::open(path("initial")));
+  model::write_initial_checkpoint(path("other"), sizes, 99);
+  config_.network.encoders = path("other");
+  const smal::SafeTensors after = smal::SafeTensors::open(run("out").model);
+  const std::string frozen = "bioclip_embedding.species_model.visual.conv1.weight";
+  EXPECT_TRUE(torch::equal(after.tensor(frozen), smal::SafeTensors::open(path("other")).tensor(frozen)));
+}
+
+TEST_F(TrainingRun, ALossThatIsNotFiniteNamesTheSamples) {
+  manifests::ShardSample bad = testing::shard_sample("poison/0", 5, true);
+  bad.betas[3] = std::numeric_limits<float>::infinity();
+  manifests::ShardHeader header;
+  header.image_encoding = "png";
+  manifests::write_shard(path("poison.h5"), header, {bad});
+  config_.phases[0].pools.push_back({"poison", {path("poison.h5")}, 1000.0});
+  try {
+    run("out");
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("step 1 of phase \"warm-up\": the loss is inf"));
+    EXPECT_THAT(error.what(), HasSubstr("poison/0"));
+  }
+}
+
+}  // namespace
+}  // namespace q3d::pipeline
