@@ -72,6 +72,7 @@ PhaseConfig parse_phase(const json& object, const std::string& where,
   int warm_up_steps = 0;
   JsonFields fields(object, where);
   fields.require("name", phase.name);
+  fields.read("objective", phase.objective);
   fields.require("steps", steps);
   fields.read("ief_iterations", phase.ief_iterations);
   fields.read("adversarial", phase.adversarial);
@@ -87,6 +88,7 @@ PhaseConfig parse_phase(const json& object, const std::string& where,
     require_one_of(name, known, where + ": pools");
     phase.pools.push_back(pools.at(name));
   }
+  require_one_of(phase.objective, {"prima", "encoders"}, where + ": objective");
   require(steps >= 1, where, fmt::format("\"steps\" must be at least 1, got {}", steps));
   require(warm_up_steps >= 0 && warm_up_steps < steps, where,
           fmt::format("\"warm_up_steps\" must be 0 to less than \"steps\", got {}", warm_up_steps));

@@ -33,6 +33,7 @@ struct PoolConfig {
 // A stretch of training with its own pools, rounds, optimiser and learning rate.
 struct PhaseConfig {
   std::string name;
+  std::string objective = "prima";  // or "encoders": pre-training of the two image encoders
   std::vector<PoolConfig> pools;
   std::int64_t steps = 0;
   int ief_iterations = 1;
