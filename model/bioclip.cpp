@@ -85,7 +85,7 @@ BioClip::BioClip(const PrimaConfig& config, const Placement& placement) : learns
   visual_ = species_model->register_module("visual", std::make_shared<ClipVisual>(config, placement));
   const auto projection = register_module("projection", std::make_shared<torch::nn::Module>());
   projection_ = projection->register_module(
-      "0", std::make_shared<Linear>(config.clip_out, config.embed_dim, placement.in_float32()));
+      "0", std::make_shared<Linear>(config.clip_out, config.embed_dim, placement.unreduced()));
   projection_norm_ = projection->register_module(
       "1", std::make_shared<LayerNorm>(config.embed_dim, kNormEpsilon, placement));
 }

@@ -174,10 +174,12 @@ void parse_optimisation(JsonFields& fields, const std::string& where, TrainingCo
   fields.read("weight_decay", config.weight_decay);
   fields.read("largest_gradient_norm", config.largest_gradient_norm);
   fields.read("divergence_factor", config.divergence_factor);
+  fields.read("model_dtype", config.model_dtype);
   fields.read("seed", config.seed);
   fields.read("checkpoint_every", checkpoint_every);
   fields.read("log_every", log_every);
   require_one_of(variant, {"sound", "official"}, where + ": loss_variant");
+  require_one_of(config.model_dtype, {"float32", "float16"}, where + ": model_dtype");
   require(config.weight_decay >= 0.0, where, "\"weight_decay\" must be 0 or more");
   require(config.largest_gradient_norm >= 0.0, where,
           "\"largest_gradient_norm\" must be 0 (no clipping) or more");

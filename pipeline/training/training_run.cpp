@@ -308,6 +308,9 @@ class Run {
     const fs::path path = options_.out / "model.safetensors";
     smal::NamedTensors tensors;
     model::append_parameters(tensors, "", net);
+    if (config_.model_dtype == "float16") {
+      for (auto& [name, tensor] : tensors) tensor = tensor.to(torch::kFloat16);
+    }
     model::write_checkpoint(path, net.config(), tensors);
     return path;
   }
