@@ -71,7 +71,7 @@ Trainer::Trainer(std::shared_ptr<PrimaNet> net, smal::SmalBody body, Priors prio
       body_(std::move(body)),
       priors_(std::move(priors)),
       options_(options),
-      optimiser_(parameter_groups(*net_), options.adamw) {
+      optimiser_(parameter_groups(*net_, options.backbone_rate_scale), options.adamw) {
   const torch::Device device = net_->placement().device;
   require(net_->placement().matrix_dtype == torch::kFloat32, "the network must hold float32 weights");
   require(body_.device() == device && priors_.precs.device() == device,

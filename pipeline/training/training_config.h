@@ -50,9 +50,10 @@ struct TrainingConfig {
   int feed_ahead = 2;  // batches prepared in the background
   model::LossWeights loss_weights;
   model::LossVariant loss_variant = model::LossVariant::sound;
+  double backbone_rate = 0.1;  // of the learning rate, in phases with the objective "prima"
   double weight_decay = 1e-4;
-  double largest_gradient_norm = 0.0;  // 0 = no clipping
-  double divergence_factor = 20.0;     // a loss above this times its running mean stops the run
+  double largest_gradient_norm = 0.0;   // 0 = no clipping
+  double divergence_factor = 20.0;      // a loss above this times its running mean stops the run
   std::string model_dtype = "float32";  // of the finished weights' file; or float16
   std::uint64_t seed = 0;
   std::int64_t checkpoint_every = 500;  // steps
