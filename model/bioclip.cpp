@@ -85,19 +85,23 @@ BioClip::BioClip(const PrimaConfig& config, const Placement& placement) : learns
   visual_ = species_model->register_module("visual", std::make_shared<ClipVisual>(config, placement));
   const auto projection = register_module("projection", std::make_shared<torch::nn::Module>());
   projection_ = projection->register_module(
-      "0", std::make_shared<Linear>(config.clip_out, config.embed_dim, placement.in_float32()));
+      "0", std::make_shared<Linear>(config.clip_out, config.embed_dim, placement.unreduced()));
   projection_norm_ = projection->register_module(
       "1", std::make_shared<LayerNorm>(config.embed_dim, kNormEpsilon, placement));
+}
+
+torch::Tensor BioClip::features(const torch::Tensor& images, const Observer& observe) const {
+  const torch::Tensor resized =
+      torch::upsample_bilinear2d(images, {kClipSidePx, kClipSidePx}, /*align_corners=*/false);
+  if (observe) observe("bioclip_resized_img", resized);
+  return visual_->forward(resized);
 }
 
 torch::Tensor BioClip::forward(const torch::Tensor& images, const Observer& observe) const {
   torch::Tensor feature;
   {
     const torch::AutoGradMode mode(learns_ && torch::GradMode::is_enabled());
-    const torch::Tensor resized =
-        torch::upsample_bilinear2d(images, {kClipSidePx, kClipSidePx}, /*align_corners=*/false);
-    if (observe) observe("bioclip_resized_img", resized);
-    feature = visual_->forward(resized);
+    feature = features(images, observe);
   }
   if (observe) observe("bioclip_feature", feature);
   return projection_norm_->forward(projection_->forward(feature));

@@ -40,6 +40,9 @@ class BioClip : public torch::nn::Module {
   // encoder is frozen, so that gradients reach the projection alone, unless the config lets it learn.
   torch::Tensor forward(const torch::Tensor& images, const Observer& observe = {}) const;
 
+  // images as above -> the encoder's own feature (B, clip_out), with its gradients if they are enabled.
+  torch::Tensor features(const torch::Tensor& images, const Observer& observe = {}) const;
+
  private:
   std::shared_ptr<ClipVisual> visual_;
   std::shared_ptr<Linear> projection_;

@@ -108,7 +108,7 @@ Decoder::Decoder(const PrimaConfig& config, const Placement& placement)
       betas_from_bio_(config.betas_from_bio),
       has_keypoint_tokens_(config.keypoint_tokens) {
   const std::int64_t width = config.dec_dim;
-  const Placement exact = placement.in_float32();
+  const Placement exact = placement.unreduced();
   const auto embedding = [&](const std::string& name) {
     const auto holder = register_module(name, std::make_shared<torch::nn::Module>());
     return holder->register_parameter("weight", torch::empty({kKeypoints, width}, placement.vector()));
@@ -137,7 +137,7 @@ Decoder::Decoder(const PrimaConfig& config, const Placement& placement)
   if (config.embed_dim != width) {
     image_proj_ = register_module("image_proj", std::make_shared<Linear>(config.embed_dim, width, placement));
   }
-  position_ = position_encoding(width).to(placement.device);
+  position_ = position_encoding(width).to(placement.vector());
   const auto layers = register_module("layers", std::make_shared<torch::nn::Module>());
   for (std::int64_t i = 0; i < config.dec_layers; ++i) {
     layers_.push_back(
@@ -164,7 +164,7 @@ DecoderMemory Decoder::remember(const torch::Tensor& image_tokens, const Observe
 
 torch::Tensor Decoder::initial_betas(const torch::Tensor& bio_token) const {
   if (!betas_from_bio_) {
-    return torch::zeros({bio_token.size(0), kBetas}, bio_token.options().dtype(torch::kFloat32));
+    return torch::zeros({bio_token.size(0), kBetas}, position_.options());
   }
   return bio_to_betas_init_->forward(bio_token);
 }

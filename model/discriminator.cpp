@@ -17,7 +17,7 @@ constexpr std::int64_t kHiddenWidth = 1024;
 }  // namespace
 
 Discriminator::Discriminator(const Placement& placement) {
-  const Placement exact = placement.in_float32();
+  const Placement exact = placement.unreduced();
   const auto convolution = [&](const std::string& name, std::int64_t in, torch::Tensor& weight,
                                torch::Tensor& bias) {
     const auto holder = register_module(name, std::make_shared<torch::nn::Module>());

@@ -10,7 +10,12 @@
 namespace q3d::model {
 namespace {
 
+constexpr double kPositionScale = 0.5;    // beside patch embeddings of about 0.6
+constexpr double kLongestPosition = 100;  // slowest wave over fastest: a few times the grid
+
 constexpr double kEmbeddingStd = 0.02;
+constexpr double kHeadGain =
+    0.01;  // a fresh head begins at the initial pose and camera (Kanazawa et al. 2018)
 
 bool ends_with(std::string_view name, std::string_view end) {
   return name.size() >= end.size() && name.substr(name.size() - end.size()) == end;
@@ -30,6 +35,11 @@ bool is_embedding(std::string_view name) {
                                      ends_with(name, "_embeddings.weight"));
 }
 
+bool is_last_of_head(std::string_view name) {
+  return ends_with(name, "decpose.2.weight") || ends_with(name, "decshape.2.weight") ||
+         ends_with(name, "deccam.2.weight");
+}
+
 // The spread of a tensor that is neither constant nor a layer norm. Embeddings have the official standard
 // deviation; matrices the fan-in rule of torch.nn.Linear, and biases none.
 double uniform_bound(const TensorSpec& spec) {
@@ -39,7 +49,31 @@ double uniform_bound(const TensorSpec& spec) {
   for (std::size_t i = 1; i < spec.shape.size(); ++i) fan_in *= static_cast<double>(spec.shape[i]);
   // CLIP multiplies by its last projection from the left, so its rows are the inputs.
   if (ends_with(spec.name, "visual.proj")) fan_in = static_cast<double>(spec.shape[0]);
-  return 1.0 / std::sqrt(fan_in);
+  const double gain = is_last_of_head(spec.name) ? kHeadGain : 1.0;
+  return gain / std::sqrt(fan_in);
+}
+
+// Sines and cosines of a token's row and column, a quarter of the width each, after a first row of zeros for
+// the class token: (1 + rows * columns, width). A ViT that starts with them knows what is next to what, which
+// random positions would have to learn (Vaswani et al. 2017; Chen et al. 2021, MoCo v3).
+torch::Tensor grid_positions(std::int64_t rows, std::int64_t columns, std::int64_t width) {
+  torch::Tensor positions = torch::zeros({1 + rows * columns, width});
+  const std::int64_t waves = width / 4;
+  auto numbers = positions.accessor<float, 2>();
+  for (std::int64_t token = 0; token < rows * columns; ++token) {
+    for (std::int64_t i = 0; i < waves; ++i) {
+      const double frequency =
+          std::pow(kLongestPosition, -static_cast<double>(i) / static_cast<double>(waves));
+      const double row = frequency * static_cast<double>(token / columns);
+      const double column = frequency * static_cast<double>(token % columns);
+      float* out = &numbers[1 + token][i];
+      out[0] = static_cast<float>(kPositionScale * std::sin(row));
+      out[waves] = static_cast<float>(kPositionScale * std::cos(row));
+      out[2 * waves] = static_cast<float>(kPositionScale * std::sin(column));
+      out[3 * waves] = static_cast<float>(kPositionScale * std::cos(column));
+    }
+  }
+  return positions;
 }
 
 }  // namespace
@@ -49,6 +83,13 @@ torch::Tensor initial_tensor(const TensorSpec& spec, std::uint64_t seed) {
     return torch::tensor({1.0F, 0.0F, 0.0F, 0.0F, 1.0F, 0.0F}).repeat({1, kPose6d / 6});
   }
   if (ends_with(spec.name, "init_cam")) return torch::tensor({{0.9F, 0.0F, 0.0F}});
+  if (ends_with(spec.name, "backbone.pos_embed")) {
+    return grid_positions(kTokenRows, kTokenColumns, spec.shape[2]).unsqueeze(0);
+  }
+  if (ends_with(spec.name, "visual.positional_embedding")) {
+    const auto side = static_cast<std::int64_t>(std::lround(std::sqrt(spec.shape[0] - 1)));
+    return grid_positions(side, side, spec.shape[1]);
+  }
   if (is_layer_norm(spec.name)) {
     return ends_with(spec.name, ".weight") ? torch::ones(spec.shape) : torch::zeros(spec.shape);
   }

@@ -33,7 +33,7 @@ LayerNorm::LayerNorm(std::int64_t width, double epsilon, const Placement& placem
 }
 
 torch::Tensor LayerNorm::forward(const torch::Tensor& x) const {
-  return torch::layer_norm(x.to(torch::kFloat32), weight_.sizes(), weight_, bias_, epsilon_);
+  return torch::layer_norm(x.to(weight_.scalar_type()), weight_.sizes(), weight_, bias_, epsilon_);
 }
 
 PatchConv::PatchConv(std::int64_t width, std::int64_t patch_px, std::int64_t padding_px, bool has_bias,
@@ -108,7 +108,7 @@ Mlp::Mlp(std::int64_t in, std::int64_t hidden, std::int64_t out, const Placement
          double negative_slope)
     : negative_slope_(negative_slope) {
   hidden_ = register_module("0", std::make_shared<Linear>(in, hidden, placement));
-  out_ = register_module("2", std::make_shared<Linear>(hidden, out, placement.in_float32()));
+  out_ = register_module("2", std::make_shared<Linear>(hidden, out, placement.unreduced()));
 }
 
 torch::Tensor Mlp::forward(const torch::Tensor& x) const {

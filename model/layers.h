@@ -2,7 +2,8 @@
 //
 // Matrices may be held in bfloat16: activations are cast at a matrix's door, its product comes back in the
 // matrix's dtype, and adding that to the float32 residual stream gives float32 again. Layer norms, embeddings
-// and the regression heads stay float32. Memory is left uninitialised: weights come from a checkpoint.
+// and the regression heads stay float32. With float64 matrices all is float64: too slow for use, but it tells
+// a rounding error from a mistake. Memory is left uninitialised: weights come from a checkpoint.
 #pragma once
 
 #include <torch/torch.h>
@@ -17,8 +18,11 @@ struct Placement {
   torch::ScalarType matrix_dtype = torch::kFloat32;
 
   torch::TensorOptions matrix() const { return torch::TensorOptions(device).dtype(matrix_dtype); }
-  torch::TensorOptions vector() const { return torch::TensorOptions(device).dtype(torch::kFloat32); }
-  Placement in_float32() const { return {device, torch::kFloat32}; }
+  torch::ScalarType vector_dtype() const {
+    return matrix_dtype == torch::kFloat64 ? torch::kFloat64 : torch::kFloat32;
+  }
+  torch::TensorOptions vector() const { return torch::TensorOptions(device).dtype(vector_dtype()); }
+  Placement unreduced() const { return {device, vector_dtype()}; }  // matrices too as vectors are
 };
 
 // Sees named intermediate tensors of a forward pass; an empty one costs nothing. For tests and debugging.
@@ -36,7 +40,7 @@ class Linear : public torch::nn::Module {
 class LayerNorm : public torch::nn::Module {
  public:
   LayerNorm(std::int64_t width, double epsilon, const Placement& placement);
-  torch::Tensor forward(const torch::Tensor& x) const;  // (..., width) float32
+  torch::Tensor forward(const torch::Tensor& x) const;  // (..., width) in the vectors' dtype
 
  private:
   torch::Tensor weight_;

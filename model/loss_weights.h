@@ -1,4 +1,5 @@
-// How the losses are weighed, and which form of them is used. Free of LibTorch, for whoever reads configurations.
+// How the losses are weighed, and which form of them is used. Free of LibTorch, for whoever reads
+// configurations.
 #pragma once
 
 namespace q3d::model {

@@ -17,9 +17,13 @@ PrimaNet::PrimaNet(const PrimaConfig& config, const Placement& placement)
   bioclip_ = register_module("bioclip_embedding", std::make_shared<BioClip>(config, placement));
 }
 
+torch::Tensor PrimaNet::image_tokens(const torch::Tensor& images, const Observer& observe) const {
+  return backbone_->forward(images.narrow(3, kFirstColumnPx, kColumnsPx), observe);
+}
+
 ImageFeatures PrimaNet::encode(const torch::Tensor& images, const Observer& observe) const {
   ImageFeatures features;
-  features.image_tokens = backbone_->forward(images.narrow(3, kFirstColumnPx, kColumnsPx), observe);
+  features.image_tokens = image_tokens(images, observe);
   features.bio_token = bioclip_->forward(images, observe);
   return features;
 }

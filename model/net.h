@@ -23,6 +23,9 @@ class PrimaNet : public torch::nn::Module {
   // images (B, 3, 256, 256) float32, normalised. Gradients flow if they are enabled.
   ImageFeatures encode(const torch::Tensor& images, const Observer& observe = {}) const;
 
+  // images as above -> (B, 192, embed_dim): the backbone on the crop's middle columns alone.
+  torch::Tensor image_tokens(const torch::Tensor& images, const Observer& observe = {}) const;
+
   const PrimaConfig& config() const { return config_; }
   const Placement& placement() const { return placement_; }
   const Vit& backbone() const { return *backbone_; }

@@ -41,12 +41,6 @@ std::vector<std::pair<std::string, torch::Tensor>> named_terms(const LossTerms& 
           {"contrastive", terms.contrastive.value()}};
 }
 
-// One copy from the device for all of them.
-std::vector<double> to_host(const std::vector<torch::Tensor>& scalars) {
-  const torch::Tensor values = torch::stack(scalars).detach().to(torch::kCPU, torch::kFloat64).contiguous();
-  return {values.data_ptr<double>(), values.data_ptr<double>() + values.numel()};
-}
-
 ParameterGroup discriminator_group(const Discriminator& discriminator) {
   ParameterGroup group;
   for (const auto& parameter : discriminator.named_parameters()) {

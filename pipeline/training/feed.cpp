@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 #include <random>
+#include <set>
 #include <span>
 #include <stdexcept>
 
@@ -27,6 +28,18 @@ std::vector<PoolShare> shares(const std::vector<ShardPool>& pools, const std::ve
   std::vector<PoolShare> result;
   for (std::size_t i = 0; i < pools.size(); ++i) result.push_back({pools[i].size(), weights[i]});
   return result;
+}
+
+std::vector<std::string> all_species(const std::vector<ShardPool>& pools) {
+  std::set<std::string> names;
+  for (const ShardPool& pool : pools) names.merge(pool.species());
+  return {names.begin(), names.end()};
+}
+
+// Index in the sorted list, -1 for a name that it lacks.
+std::int64_t number_of(const std::string& name, const std::vector<std::string>& names) {
+  const auto found = std::lower_bound(names.begin(), names.end(), name);
+  return found != names.end() && *found == name ? found - names.begin() : -1;
 }
 
 template <typename T>
@@ -95,6 +108,7 @@ FeedBatch empty_batch(std::int64_t size, std::int64_t first_draw) {
   batch.has_pose.resize(count);
   batch.has_betas.resize(count);
   batch.family.resize(count);
+  batch.species.resize(count);
   return batch;
 }
 
@@ -108,6 +122,7 @@ int arena_threads(int wanted) {
 Feed::Feed(std::vector<ShardPool> pools, const std::vector<double>& weights, const FeedOptions& options,
            std::uint64_t seed)
     : pools_(std::move(pools)),
+      species_(all_species(pools_)),
       draws_(shares(pools_, weights), seed),
       options_(options),
       arena_(std::make_unique<tbb::task_arena>(arena_threads(options.threads))) {
@@ -148,6 +163,7 @@ void Feed::fill(FeedBatch& batch, std::int64_t slot) const {
   fill_keypoints_2d(sample, patch_from_image, options_.keypoint_weight,
                     row(batch.keypoints_2d, slot, kKeypoints * 3));
   fill_body(sample, augmentation.rotation_deg, batch, slot);
+  batch.species[static_cast<std::size_t>(slot)] = number_of(sample.species, species_);
 }
 
 std::vector<std::string> Feed::ids(std::int64_t first_draw) const {

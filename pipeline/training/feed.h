@@ -39,6 +39,7 @@ struct FeedBatch {
   std::vector<float> betas;                // (B, 41); zeros where there are none
   std::vector<float> has_pose, has_betas;  // (B)
   std::vector<std::int64_t> family;        // (B), -1 for none
+  std::vector<std::int64_t> species;       // (B), index into Feed::species(), -1 for unknown
 };
 
 // Thread-safe. A batch depends on pools, options but the threads, seed and position alone.
@@ -53,12 +54,15 @@ class Feed {
   FeedBatch batch(std::int64_t first_draw) const;
   // The samples of a batch, for messages.
   std::vector<std::string> ids(std::int64_t first_draw) const;
+  // The pools' species by name.
+  const std::vector<std::string>& species() const { return species_; }
   std::int64_t batch_size() const { return options_.batch; }
 
  private:
   void fill(FeedBatch& batch, std::int64_t slot) const;
 
   std::vector<ShardPool> pools_;
+  std::vector<std::string> species_;
   DrawSequence draws_;
   FeedOptions options_;
   std::unique_ptr<tbb::task_arena> arena_;

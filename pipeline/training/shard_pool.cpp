@@ -92,6 +92,7 @@ TrainingSample ShardPool::sample(std::int64_t index) const {
   const auto box = read_row<double, 3>(*table, "patch_box_px", row);
   sample.box = {box[0], box[1], box[2]};
   sample.keypoints = read_keypoints(*table, row);
+  sample.species = table->text("species", row, 1).front();
   sample.family = static_cast<manifests::Family>(read_row<std::int8_t, 1>(*table, "family", row)[0]);
   sample.has_pose = read_flag(*table, "has_pose", row);
   sample.has_betas = read_flag(*table, "has_betas", row);
@@ -100,6 +101,16 @@ TrainingSample ShardPool::sample(std::int64_t index) const {
   sample.betas = read_row<float, manifests::kNumBetas>(*table, "betas", row);
   sample.keypoints_3d = read_row<float, manifests::kNumKeypoints * 3>(*table, "keypoints_3d", row);
   return sample;
+}
+
+std::set<std::string> ShardPool::species() const {
+  std::set<std::string> names;
+  for (const manifests::ShardReader& shard : shards_) {
+    for (std::string& name : shard.table().text("species", 0, shard.rows())) {
+      if (!name.empty()) names.insert(std::move(name));
+    }
+  }
+  return names;
 }
 
 std::string ShardPool::id(std::int64_t index) const {

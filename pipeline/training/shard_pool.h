@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,7 @@ struct TrainingSample {
   loaders::Affine crop_from_image{};
   loaders::SquareBox box;
   manifests::Keypoints keypoints;
+  std::string species;  // empty when unknown
   manifests::Family family = manifests::Family::none;
   bool has_pose = false;
   bool has_betas = false;
@@ -43,6 +45,7 @@ class ShardPool {
   // read.
   TrainingSample sample(std::int64_t index) const;
   std::string id(std::int64_t index) const;
+  std::set<std::string> species() const;  // all names but the empty one
 
  private:
   struct Place {

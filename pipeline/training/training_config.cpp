@@ -72,6 +72,7 @@ PhaseConfig parse_phase(const json& object, const std::string& where,
   int warm_up_steps = 0;
   JsonFields fields(object, where);
   fields.require("name", phase.name);
+  fields.read("objective", phase.objective);
   fields.require("steps", steps);
   fields.read("ief_iterations", phase.ief_iterations);
   fields.read("adversarial", phase.adversarial);
@@ -87,6 +88,7 @@ PhaseConfig parse_phase(const json& object, const std::string& where,
     require_one_of(name, known, where + ": pools");
     phase.pools.push_back(pools.at(name));
   }
+  require_one_of(phase.objective, {"prima", "encoders"}, where + ": objective");
   require(steps >= 1, where, fmt::format("\"steps\" must be at least 1, got {}", steps));
   require(warm_up_steps >= 0 && warm_up_steps < steps, where,
           fmt::format("\"warm_up_steps\" must be 0 to less than \"steps\", got {}", warm_up_steps));
@@ -172,10 +174,12 @@ void parse_optimisation(JsonFields& fields, const std::string& where, TrainingCo
   fields.read("weight_decay", config.weight_decay);
   fields.read("largest_gradient_norm", config.largest_gradient_norm);
   fields.read("divergence_factor", config.divergence_factor);
+  fields.read("model_dtype", config.model_dtype);
   fields.read("seed", config.seed);
   fields.read("checkpoint_every", checkpoint_every);
   fields.read("log_every", log_every);
   require_one_of(variant, {"sound", "official"}, where + ": loss_variant");
+  require_one_of(config.model_dtype, {"float32", "float16"}, where + ": model_dtype");
   require(config.weight_decay >= 0.0, where, "\"weight_decay\" must be 0 or more");
   require(config.largest_gradient_norm >= 0.0, where,
           "\"largest_gradient_norm\" must be 0 (no clipping) or more");

@@ -33,6 +33,7 @@ struct PoolConfig {
 // A stretch of training with its own pools, rounds, optimiser and learning rate.
 struct PhaseConfig {
   std::string name;
+  std::string objective = "prima";  // or "encoders": pre-training of the two image encoders
   std::vector<PoolConfig> pools;
   std::int64_t steps = 0;
   int ief_iterations = 1;
@@ -52,6 +53,7 @@ struct TrainingConfig {
   double weight_decay = 1e-4;
   double largest_gradient_norm = 0.0;  // 0 = no clipping
   double divergence_factor = 20.0;     // a loss above this times its running mean stops the run
+  std::string model_dtype = "float32";  // of the finished weights' file; or float16
   std::uint64_t seed = 0;
   std::int64_t checkpoint_every = 500;  // steps
   std::int64_t log_every = 10;          // steps

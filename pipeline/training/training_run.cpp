@@ -16,6 +16,7 @@
 #include "manifests/lock.h"
 #include "model/checkpoint.h"
 #include "model/device.h"
+#include "model/encoder_trainer.h"
 #include "model/module_state.h"
 #include "model/priors.h"
 #include "model/trainer.h"
@@ -75,6 +76,7 @@ model::TrainingBatch to_tensors(FeedBatch&& from) {
   targets.has_pose = view(batch->has_pose.data(), {}, torch::kFloat32);
   targets.has_betas = view(batch->has_betas.data(), {}, torch::kFloat32);
   targets.family = view(batch->family.data(), {}, torch::kInt64);
+  result.species = view(batch->species.data(), {}, torch::kInt64);
   return result;
 }
 
@@ -120,8 +122,8 @@ std::string run_key(const TrainingConfig& config, const fs::path& out) {
     for (const PoolConfig& pool : phase.pools) {
       pools.push_back({pool.name, ShardPool(pool.name, pool.shards).size(), pool.weight});
     }
-    phases.push_back({phase.name, phase.steps, phase.ief_iterations, phase.adversarial, phase.learning_rate,
-                      phase.warm_up_steps, phase.decay, pools});
+    phases.push_back({phase.name, phase.objective, phase.steps, phase.ief_iterations, phase.adversarial,
+                      phase.learning_rate, phase.warm_up_steps, phase.decay, pools});
   }
   return manifests::sha256(nlohmann::json{settings, assets, phases}.dump());
 }
@@ -136,6 +138,19 @@ model::TrainerOptions trainer_options(const TrainingConfig& config, const PhaseC
   options.precision =
       config.network.precision == "bfloat16" ? model::Precision::bfloat16 : model::Precision::float32;
   options.adversarial = phase.adversarial;
+  options.seed = config.seed;
+  return options;
+}
+
+model::EncoderTrainerOptions encoder_options(const TrainingConfig& config, const PhaseConfig& phase,
+                                             std::size_t species) {
+  const model::TrainerOptions common = trainer_options(config, phase);
+  model::EncoderTrainerOptions options;
+  options.adamw = common.adamw;
+  options.schedule = common.schedule;
+  options.largest_gradient_norm = common.largest_gradient_norm;
+  options.precision = common.precision;
+  options.species = static_cast<std::int64_t>(species);
   options.seed = config.seed;
   return options;
 }
@@ -214,6 +229,20 @@ class Run {
     return options_.max_steps > 0 && summary.steps_here >= options_.max_steps;
   }
 
+  std::unique_ptr<model::Learner> make_learner(const std::shared_ptr<model::PrimaNet>& net,
+                                               const PhaseConfig& phase, const Feed& feed) const {
+    try {
+      if (phase.objective == "encoders") {
+        return std::make_unique<model::EncoderTrainer>(
+            net, encoder_options(config_, phase, feed.species().size()));
+      }
+      return std::make_unique<model::Trainer>(net, smal::SmalBody(asset_, device_.device), priors_,
+                                              trainer_options(config_, phase));
+    } catch (const std::invalid_argument& error) {
+      throw ConfigError(fmt::format("phase \"{}\": {}", phase.name, error.what()));
+    }
+  }
+
   // The present phase, from the present step, to its end or until this call must stop.
   std::shared_ptr<model::PrimaNet> run_phase(const std::shared_ptr<model::PrimaNet>& from, TrainingLog& log,
                                              Progress& progress, TrainingSummary& summary) {
@@ -222,33 +251,32 @@ class Run {
     sizes.ief_iterations = phase.ief_iterations;
     const auto net = model::with_config(*from, sizes);
     torch::manual_seed(phase_seed(config_, position_.phase));
-    model::Trainer trainer(net, smal::SmalBody(asset_, device_.device), priors_,
-                           trainer_options(config_, phase));
-    if (stored_ && position_.step > 0) trainer.restore(stored_->file);
-    stored_.reset();
     const Feed feed = open_feed(config_, phase, position_.phase, options_.threads);
+    const std::unique_ptr<model::Learner> learner = make_learner(net, phase, feed);
+    if (stored_ && position_.step > 0) learner->restore(stored_->file);
+    stored_.reset();
     FeedStream stream(feed, position_.step * feed.batch_size(), config_.feed_ahead);
     while (position_.step < phase.steps) {
       if (interrupted()) {
-        save_state(state_path(), trainer, position_, key_);
+        save_state(state_path(), *learner, position_, key_);
         throw Interrupted("interrupted");
       }
       if (limit_reached(summary)) break;
-      step(phase, trainer, feed, stream.next(), log, summary);
+      step(phase, *learner, feed, stream.next(), log, summary);
       progress.advance(1);
       if (position_.step % config_.checkpoint_every == 0 && position_.step < phase.steps) {
-        save_state(state_path(), trainer, position_, key_);
+        save_state(state_path(), *learner, position_, key_);
       }
     }
     if (position_.step == phase.steps) position_ = {position_.phase + 1, 0, {}};
-    save_state(state_path(), trainer, position_, key_);
+    save_state(state_path(), *learner, position_, key_);
     return net;
   }
 
-  void step(const PhaseConfig& phase, model::Trainer& trainer, const Feed& feed, FeedBatch&& batch,
+  void step(const PhaseConfig& phase, model::Learner& learner, const Feed& feed, FeedBatch&& batch,
             TrainingLog& log, TrainingSummary& summary) {
     const std::int64_t first_draw = batch.first_draw;
-    const model::StepReport report = trainer.step(to_tensors(std::move(batch)));
+    const model::StepReport report = learner.step(to_tensors(std::move(batch)));
     const auto fault = position_.watch.check(report.loss, report.gradient_norm, config_.divergence_factor);
     if (fault) stop(phase, *fault, report, feed.ids(first_draw));
     ++position_.step;
@@ -280,6 +308,9 @@ class Run {
     const fs::path path = options_.out / "model.safetensors";
     smal::NamedTensors tensors;
     model::append_parameters(tensors, "", net);
+    if (config_.model_dtype == "float16") {
+      for (auto& [name, tensor] : tensors) tensor = tensor.to(torch::kFloat16);
+    }
     model::write_checkpoint(path, net.config(), tensors);
     return path;
   }

@@ -23,14 +23,14 @@ const std::string& entry(const smal::SafeTensors& file, const char* name) {
 
 }  // namespace
 
-void save_state(const std::filesystem::path& path, const model::Trainer& trainer,
+void save_state(const std::filesystem::path& path, const model::Learner& learner,
                 const TrainingPosition& position, const std::string& key) {
   // JSON keeps a double's shortest exact form, so the watch comes back bit for bit.
   const nlohmann::json document = {{"phase", position.phase},
                                    {"step", position.step},
                                    {"watch_mean", position.watch.mean},
                                    {"watch_seen", position.watch.seen}};
-  model::write_checkpoint(path, trainer.net().config(), trainer.state(),
+  model::write_checkpoint(path, learner.net().config(), learner.state(),
                           {{kPosition, document.dump()}, {kKey, key}});
 }
 

@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "model/trainer.h"
+#include "model/learner.h"
 #include "pipeline/training/loss_watch.h"
 #include "smal/safetensors.h"
 
@@ -24,7 +24,7 @@ struct StoredState {
 };
 
 // `key` identifies the configuration that the run belongs to.
-void save_state(const std::filesystem::path& path, const model::Trainer& trainer,
+void save_state(const std::filesystem::path& path, const model::Learner& learner,
                 const TrainingPosition& position, const std::string& key);
 
 // Nothing when there is no file. Throws ConfigError when it belongs to another key, std::runtime_error when

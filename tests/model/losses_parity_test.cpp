@@ -1,4 +1,10 @@
 // Losses, gradients and optimiser steps against the official code's.
+//
+// The keypoint losses have kinks and a round of iterative feedback amplifies what goes in, so float32
+// gradients differ between two processors by up to 1e-3 of their largest element, and three steps of AdamW,
+// each of which moves every element by about the learning rate whatever its gradient's size, amplify that
+// further. What is exact is therefore compared in float64: the official code's losses of three steps are
+// given in float64 too, and a mistake in any gradient or in the optimiser would show in them at once.
 #include "model/losses.h"
 
 #include <gtest/gtest.h>
@@ -20,18 +26,31 @@ namespace {
 
 using testing::parity_file;
 
-Targets targets_of(const smal::SafeTensors& file) {
+Targets targets_of(const smal::SafeTensors& file, torch::ScalarType dtype) {
   Targets targets;
   targets.keypoints_2d = file.tensor("batch_keypoints_2d");
   targets.keypoints_3d = file.tensor("batch_keypoints_3d");
   const torch::Tensor axis_angle =
       torch::cat({file.tensor("batch_smal_global_orient"), file.tensor("batch_smal_pose")}, 1);
-  targets.rotations = smal::axis_angle_to_matrix(axis_angle.unflatten(1, {35, 3}));
+  targets.rotations = smal::axis_angle_to_matrix(axis_angle.unflatten(1, {35, 3}).to(dtype));
   targets.betas = file.tensor("batch_smal_betas");
   targets.has_pose = file.tensor("batch_has_pose");
   targets.has_betas = file.tensor("batch_has_betas");
   targets.family = file.tensor("batch_category").to(torch::kInt64);
+  for (torch::Tensor* tensor : {&targets.keypoints_2d, &targets.keypoints_3d, &targets.betas,
+                                &targets.has_pose, &targets.has_betas}) {
+    *tensor = tensor->to(dtype);
+  }
   return targets;
+}
+
+Priors priors_of(const std::string& which, torch::ScalarType dtype) {
+  Priors priors = load_priors(parity_file("weights_" + which), torch::kCPU);
+  for (torch::Tensor* tensor :
+       {&priors.mean_pose, &priors.precs, &priors.use_index, &priors.mean_betas, &priors.betas_prec}) {
+    *tensor = tensor->to(dtype);
+  }
+  return priors;
 }
 
 nlohmann::json meta_of(const std::string& name) {
@@ -57,14 +76,15 @@ LossWeights weights_of(const nlohmann::json& meta) {
 // The network of the golden numbers, trainable, without dropout or stochastic depth.
 class LossesParity : public ::testing::TestWithParam<std::string> {
  protected:
-  LossesParity()
+  explicit LossesParity(torch::ScalarType dtype = torch::kFloat32)
       : config_(still(testing::parity_config(GetParam()))),
-        prima_(testing::parity_prima(GetParam(), config_)),
+        prima_(testing::parity_prima(GetParam(), config_, dtype)),
         groups_(parameter_groups(prima_.net())),
         file_(parity_file("losses_" + GetParam())),
         meta_(meta_of("losses_" + GetParam())),
-        priors_(load_priors(parity_file("weights_" + GetParam()), torch::kCPU)),
-        images_(testing::parity_images(prima_, torch::arange(6))) {
+        priors_(priors_of(GetParam(), dtype)),
+        targets_(targets_of(file_, dtype)),
+        images_(testing::parity_images(prima_, torch::arange(6)).to(dtype)) {
     prima_.net().train();
   }
 
@@ -84,7 +104,7 @@ class LossesParity : public ::testing::TestWithParam<std::string> {
   }
 
   torch::Tensor loss(LossVariant variant = LossVariant::official) const {
-    return total_loss(loss_terms(predict(), targets_of(file_), priors_, variant), weights_of(meta_));
+    return total_loss(loss_terms(predict(), targets_, priors_, variant), weights_of(meta_));
   }
 
   void expect_terms(const std::string& prefix, const LossTerms& terms) const {
@@ -111,6 +131,21 @@ class LossesParity : public ::testing::TestWithParam<std::string> {
     }
   }
 
+  // Relative to each norm.
+  void expect_gradient_norms(double tolerance) const {
+    const auto names = meta_.at("param_names").get<std::vector<std::string>>();
+    const torch::Tensor norms = file_.tensor("grad_norms");
+    ASSERT_EQ(norms.size(0), static_cast<std::int64_t>(names.size()));
+    std::size_t trained = 0;
+    for (const ParameterGroup& group : groups_) trained += group.parameters.size();
+    EXPECT_EQ(trained, names.size());
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      const double expected = norms[static_cast<std::int64_t>(i)].item<double>();
+      EXPECT_NEAR(parameter(names[i]).grad().norm().item<double>(), expected, tolerance * expected + 1e-7)
+          << names[i];
+    }
+  }
+
   const torch::Tensor& parameter(const std::string& name) const {
     for (const ParameterGroup& group : groups_) {
       for (const auto& [key, tensor] : group.parameters) {
@@ -126,17 +161,23 @@ class LossesParity : public ::testing::TestWithParam<std::string> {
   smal::SafeTensors file_;
   nlohmann::json meta_;
   Priors priors_;
+  Targets targets_;
   torch::Tensor images_;
+};
+
+class ExactLossesParity : public LossesParity {
+ protected:
+  ExactLossesParity() : LossesParity(torch::kFloat64) {}
 };
 
 TEST_P(LossesParity, EachTerm) {
   const torch::NoGradGuard no_grad;
-  expect_terms("term_", loss_terms(predict(), targets_of(file_), priors_, LossVariant::official));
+  expect_terms("term_", loss_terms(predict(), targets_, priors_, LossVariant::official));
 }
 
 TEST_P(LossesParity, EachTermWhenAllSamplesHaveTruth) {
   const torch::NoGradGuard no_grad;
-  Targets targets = targets_of(file_);
+  Targets targets = targets_;
   targets.has_pose = torch::ones_like(targets.has_pose);
   targets.has_betas = torch::ones_like(targets.has_betas);
   expect_terms("allgt_term_", loss_terms(predict(), targets, priors_, LossVariant::official));
@@ -144,34 +185,28 @@ TEST_P(LossesParity, EachTermWhenAllSamplesHaveTruth) {
 
 TEST_P(LossesParity, SoundVariantHasTheSameValueAndGradients) {
   loss(LossVariant::sound).backward();
-  const auto names = meta_.at("param_names").get<std::vector<std::string>>();
-  const torch::Tensor norms = file_.tensor("grad_norms");
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    const double expected = norms[static_cast<std::int64_t>(i)].item<double>();
-    EXPECT_NEAR(parameter(names[i]).grad().norm().item<double>(), expected, 1e-4 * expected + 1e-7)
-        << names[i];
-  }
+  expect_gradient_norms(1e-4);
 }
 
-TEST_P(LossesParity, Gradients) {
+TEST_P(LossesParity, GradientNorms) {
   loss().backward();
-  const auto names = meta_.at("param_names").get<std::vector<std::string>>();
-  const torch::Tensor norms = file_.tensor("grad_norms");
-  ASSERT_EQ(norms.size(0), static_cast<std::int64_t>(names.size()));
-  std::size_t trained = 0;
-  for (const ParameterGroup& group : groups_) trained += group.parameters.size();
-  EXPECT_EQ(trained, names.size());
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    const double expected = norms[static_cast<std::int64_t>(i)].item<double>();
-    EXPECT_NEAR(parameter(names[i]).grad().norm().item<double>(), expected, 1e-5 * expected + 1e-7)
-        << names[i];
-  }
+  expect_gradient_norms(5e-5);
+}
+
+// What is left is the rounding of the golden float32 numbers themselves.
+TEST_P(ExactLossesParity, Gradients) {
+  const bool feedback = config_.ief_iterations > 1;
+  loss().backward();
+  expect_gradient_norms(feedback ? 5e-5 : 1e-5);
+  std::size_t compared = 0;
   for (const std::string& name : file_.names()) {
     if (!name.starts_with("grad_") || name == "grad_norms") continue;
     const torch::Tensor expected = file_.tensor(name);
     testing::expect_close(name, parameter(name.substr(5)).grad(), expected,
-                          1e-5 * expected.abs().max().item<double>());
+                          (feedback ? 5e-4 : 1e-5) * expected.abs().max().item<double>());
+    ++compared;
   }
+  EXPECT_GT(compared, 5);
 }
 
 // True where the gradient is zero in theory, so that AdamW moves an element by its learning rate with the
@@ -187,7 +222,7 @@ torch::Tensor is_noise(const std::string& name, const torch::Tensor& tensor) {
   return noise;
 }
 
-TEST_P(LossesParity, ThreeOptimiserSteps) {
+TEST_P(ExactLossesParity, ThreeOptimiserSteps) {
   const nlohmann::json& adamw = meta_.at("adamw");
   ASSERT_EQ(adamw.at("groups").size(), groups_.size());
   for (std::size_t i = 0; i < groups_.size(); ++i) {
@@ -200,15 +235,12 @@ TEST_P(LossesParity, ThreeOptimiserSteps) {
     for (const auto& [name, tensor] : group.parameters) before[name] = tensor.detach().clone();
   }
   AdamW optimiser(groups_, {});
-  const torch::Tensor losses = file_.tensor("adamw_losses");
-  const auto exact_losses = meta_.at("adamw_losses_fp64").get<std::vector<double>>();
-  for (std::int64_t step = 0; step < 3; ++step) {
+  const auto losses = meta_.at("adamw_losses_fp64").get<std::vector<double>>();
+  ASSERT_EQ(losses.size(), 3);
+  for (const double expected : losses) {
     optimiser.zero_grad();
     const torch::Tensor now = loss();
-    // The parameters' noise shows in the later losses: as far as float32 is from float64 there.
-    const double expected = losses[step].item<double>();
-    const double noise = 2.0 * std::abs(expected - exact_losses[static_cast<std::size_t>(step)]);
-    EXPECT_NEAR(now.item<double>(), expected, 1e-5 * expected + noise);
+    EXPECT_NEAR(now.item<double>(), expected, 2e-6 * expected);
     now.backward();
     optimiser.step(adamw.at("lr"));
   }
@@ -228,11 +260,12 @@ TEST_P(LossesParity, ThreeOptimiserSteps) {
     ASSERT_EQ(got.sizes(), expected.sizes()) << key;
     if (!kept.any().item<bool>()) continue;
     const torch::Tensor difference = (got - expected).abs().masked_select(kept);
-    // Two float32 runs each differ from float64 by up to the table's numbers.
+    // The table tells how far the golden float32 numbers are from float64: over all elements, these are every
+    // seventh of some.
     const double largest = noise_table.at(key)[0];
     const double mean = noise_table.at(key)[1];
     EXPECT_LE(difference.max().item<double>(), 2.0 * largest + 1e-6) << key;
-    EXPECT_LE(difference.mean().item<double>(), 2.0 * mean) << key;
+    EXPECT_LE(difference.mean().item<double>(), 3.0 * mean) << key;
     // An optimiser that does nothing must not pass.
     const torch::Tensor moved = (expected - thin(before.at(key))).abs().masked_select(kept);
     EXPECT_GT(moved.mean().item<double>(), 20.0 * difference.mean().item<double>()) << key;
@@ -247,6 +280,7 @@ TEST_P(LossesParity, ContrastiveLossOfGivenFeatures) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Networks, LossesParity, ::testing::Values("A", "B"));
+INSTANTIATE_TEST_SUITE_P(Networks, ExactLossesParity, ::testing::Values("A", "B"));
 
 }  // namespace
 }  // namespace q3d::model

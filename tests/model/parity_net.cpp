@@ -48,13 +48,14 @@ model::Prima parity_prima(const std::string& which) {
   return parity_prima(which, parity_config(which));
 }
 
-model::Prima parity_prima(const std::string& which, const model::PrimaConfig& config) {
+model::Prima parity_prima(const std::string& which, const model::PrimaConfig& config,
+                          torch::ScalarType dtype) {
   model::configure_compute(1);  // a network this small only loses time to a second thread
   const smal::SmalAsset asset = load_parity_asset(parity_dir());
-  auto net = model::load_net(parity_file("weights_" + which), config, asset, {});
+  auto net = model::load_net(parity_file("weights_" + which), config, asset, {torch::kCPU, dtype});
   net->eval();
   for (auto& parameter : net->parameters()) parameter.set_requires_grad(false);
-  return {net, smal::SmalBody(asset)};
+  return {net, smal::SmalBody(asset).to_dtype(dtype)};
 }
 
 torch::Tensor parity_images(const model::Prima& prima, const torch::Tensor& index) {

@@ -17,7 +17,8 @@ model::PrimaConfig parity_config(const std::string& which);
 
 // The frozen network of weights_<which> with the golden body, float32 on the CPU.
 model::Prima parity_prima(const std::string& which);
-model::Prima parity_prima(const std::string& which, const model::PrimaConfig& config);
+model::Prima parity_prima(const std::string& which, const model::PrimaConfig& config,
+                          torch::ScalarType dtype = torch::kFloat32);  // float64: the body too
 
 smal::SafeTensors parity_file(const std::string& name);
 

@@ -24,6 +24,7 @@ manifests::ShardSample shard_sample(const std::string& id, unsigned seed, bool l
   sample.record.id = id;
   sample.record.dataset = "made";
   sample.record.split = "train";
+  sample.record.species = seed % 2 == 0 ? "lynx" : "okapi";
   sample.record.family = seed % 6 == 5 ? manifests::Family::none : static_cast<manifests::Family>(seed % 6);
   sample.record.box = {uniform(40, 60), uniform(30, 50), uniform(120, 160), uniform(100, 140)};
   for (auto& keypoint : sample.record.keypoints) {

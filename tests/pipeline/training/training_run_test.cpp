@@ -39,8 +39,8 @@ class TrainingRun : public ::testing::Test {
     config_.network.compute_threads = 1;
     const PoolConfig first{"first", {path("first.h5")}, 1.0};
     const PoolConfig second{"second", {path("second.h5")}, 0.15};
-    config_.phases = {{"warm-up", {first}, 3, 2, true, 1e-3, 1, "linear"},
-                      {"joint", {first, second}, 3, 1, false, 1e-3, 0, "linear"}};
+    config_.phases = {{"warm-up", "prima", {first}, 3, 2, true, 1e-3, 1, "linear"},
+                      {"joint", "prima", {first, second}, 3, 1, false, 1e-3, 0, "linear"}};
     config_.feed.batch = 2;
     config_.seed = 17;
     config_.checkpoint_every = 2;
@@ -74,6 +74,28 @@ TEST_F(TrainingRun, StoppedAnywhereItEndsWithTheSameWeights) {
   EXPECT_EQ(manifests::read_file(straight.model), manifests::read_file(last.model));
   EXPECT_EQ(manifests::read_file(path("straight/state.safetensors")),
             manifests::read_file(path("stopped/state.safetensors")));
+}
+
+TEST_F(TrainingRun, EncodersAreTrainedAloneAndResume) {
+  const PoolConfig first{"first", {path("first.h5")}, 1.0};
+  config_.phases = {{"encoders", "encoders", {first}, 4, 1, false, 1e-3, 1, "linear"}};
+  const TrainingSummary straight = run("straight");
+  run("stopped", 1);
+  EXPECT_EQ(manifests::read_file(straight.model), manifests::read_file(run("stopped").model));
+  const smal::SafeTensors before = smal::SafeTensors::open(path("initial"));
+  const smal::SafeTensors after = smal::SafeTensors::open(straight.model);
+  for (const std::string& name : before.names()) {
+    const bool encoder =
+        name.starts_with("backbone.") || name.starts_with("bioclip_embedding.species_model.");
+    EXPECT_NE(torch::equal(before.tensor(name), after.tensor(name)), encoder) << name;
+  }
+}
+
+TEST_F(TrainingRun, OneSpeciesCannotBeTold) {
+  testing::write_sample_shard(path("single.h5"), "single", 1, 1);
+  config_.phases = {
+      {"encoders", "encoders", {{"single", {path("single.h5")}, 1.0}}, 4, 1, false, 1e-3, 0, "linear"}};
+  EXPECT_THROW(run("out"), ConfigError);
 }
 
 TEST_F(TrainingRun, AKilledRunRepeatsStepsAfterItsNewestState) {

@@ -1,0 +1,61 @@
+// Pre-training of the two image encoders. The paper starts from encoders that others trained: a ViT that
+// knows animals' keypoints and a BioCLIP that knows species. Where no such weights fit, as for the small
+// network, this gives both encoders the same knowledge from labelled pictures: the ViT learns in which of its
+// tokens each keypoint lies, and both learn to name the species.
+#pragma once
+
+#include <torch/torch.h>
+
+#include <cstdint>
+#include <memory>
+
+#include "model/learner.h"
+#include "model/net.h"
+#include "model/optimiser.h"
+
+namespace q3d::model {
+
+struct EncoderTrainerOptions {
+  AdamWOptions adamw;
+  RateSchedule schedule;
+  double largest_gradient_norm = 0.0;  // longer gradients are scaled down to it; 0 = never
+  Precision precision = Precision::float32;
+  std::int64_t species = 0;  // number of names
+  std::uint64_t seed = 0;    // of the heads' weights
+};
+
+// Where the keypoints lie on the ViT's grid of tokens. keypoints (B, 26, 3): x, y in crop units and a weight.
+struct TokenTargets {
+  torch::Tensor share;   // (B, 26, 192) float32: bilinear shares of the four nearest tokens, summing to 1
+  torch::Tensor weight;  // (B, 26) float32: 0 also for keypoints outside the grid
+};
+TokenTargets token_targets(const torch::Tensor& keypoints);
+
+class EncoderTrainer : public Learner {
+ public:
+  // Trains net's encoders and leaves its other parameters alone. Throws std::invalid_argument when the net
+  // does not hold float32 or there are fewer than two species.
+  EncoderTrainer(std::shared_ptr<PrimaNet> net, const EncoderTrainerOptions& options);
+
+  PrimaNet& net() const override { return *net_; }
+  StepReport step(const TrainingBatch& batch) override;
+  smal::NamedTensors state() const override;
+  void restore(const smal::SafeTensors& file) override;
+
+ private:
+  class Heads;
+  struct Outputs {
+    torch::Tensor keypoint_logits;   // (B, 192, 26)
+    torch::Tensor backbone_species;  // (B, species)
+    torch::Tensor bioclip_species;   // (B, species)
+  };
+  Outputs predict(const torch::Tensor& images) const;
+
+  std::shared_ptr<PrimaNet> net_;
+  EncoderTrainerOptions options_;
+  std::shared_ptr<Heads> heads_;
+  AdamW optimiser_;
+  std::int64_t steps_ = 0;
+};
+
+}  // namespace q3d::model

@@ -1,0 +1,56 @@
+// What a training run needs of whatever it trains: a step at a time, and a state that goes on bit for bit.
+#pragma once
+
+#include <torch/torch.h>
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "model/losses.h"
+#include "model/net.h"
+#include "smal/safetensors.h"
+
+namespace q3d::model {
+
+struct TrainingBatch {
+  torch::Tensor images;  // (B, 3, 256, 256) float32, normalised
+  Targets targets;
+  torch::Tensor species;  // (B) int64: number in a list of names, -1 unknown; read by EncoderTrainer alone
+};
+
+enum class Precision { float32, bfloat16 };  // of the forward pass; weights and losses are float32
+
+struct StepReport {
+  double loss = 0.0;                                  // weighted total
+  std::vector<std::pair<std::string, double>> terms;  // not weighted, in a fixed order
+  double gradient_norm = 0.0;                         // before clipping
+  double learning_rate = 0.0;
+  // False when loss or gradient are not finite. Then no weight was changed and the step does not count.
+  bool applied = false;
+};
+
+class Learner {
+ public:
+  Learner() = default;
+  Learner(const Learner&) = delete;
+  Learner& operator=(const Learner&) = delete;
+  virtual ~Learner() = default;
+
+  virtual PrimaNet& net() const = 0;
+
+  // Tensors of the batch may be on any device. Throws std::invalid_argument on wrong shapes or labels.
+  virtual StepReport step(const TrainingBatch& batch) = 0;
+
+  // All that the next step depends on but the batch: weights under their official names, and under
+  // "training." the optimisers, the step count and LibTorch's random generators. A learner that restores it
+  // goes on bit for bit.
+  virtual smal::NamedTensors state() const = 0;
+  // Throws std::runtime_error naming the tensor, got and expected.
+  virtual void restore(const smal::SafeTensors& file) = 0;
+};
+
+// One copy from the device for all of them.
+std::vector<double> to_host(const std::vector<torch::Tensor>& scalars);
+
+}  // namespace q3d::model
