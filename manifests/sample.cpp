@@ -10,7 +10,7 @@ constexpr std::array<std::string_view, 6> kFamilyNames{"none",    "felidae", "ca
                                                        "equidae", "bovidae", "hippopotamidae"};
 static_assert(kFamilyNames.size() == static_cast<std::size_t>(Family::hippopotamidae) + 2);
 
-constexpr std::array<std::string_view, 23> kReasonNames{
+constexpr std::array<std::string_view, 24> kReasonNames{
     "none",
     "box_missing",
     "box_not_finite",
@@ -22,6 +22,7 @@ constexpr std::array<std::string_view, 23> kReasonNames{
     "no_visible_keypoints",
     "record_malformed",
     "image_not_listed",
+    "pose_missing",
     "not_a_quadruped",
     "image_missing",
     "image_empty",

@@ -64,6 +64,7 @@ enum class Reason : std::uint8_t {
   no_visible_keypoints,
   record_malformed,
   image_not_listed,
+  pose_missing,     // the build wants the file's own body as the label, and the record has none
   not_a_quadruped,  // left out by the species rule (birds, primates, ...)
   // failed while reading the picture
   image_missing,

@@ -14,6 +14,8 @@ constexpr double kPositionScale = 0.5;    // beside patch embeddings of about 0.
 constexpr double kLongestPosition = 100;  // slowest wave over fastest: a few times the grid
 
 constexpr double kEmbeddingStd = 0.02;
+constexpr double kHeadGain =
+    0.01;  // a fresh head begins at the initial pose and camera (Kanazawa et al. 2018)
 
 bool ends_with(std::string_view name, std::string_view end) {
   return name.size() >= end.size() && name.substr(name.size() - end.size()) == end;
@@ -33,6 +35,11 @@ bool is_embedding(std::string_view name) {
                                      ends_with(name, "_embeddings.weight"));
 }
 
+bool is_last_of_head(std::string_view name) {
+  return ends_with(name, "decpose.2.weight") || ends_with(name, "decshape.2.weight") ||
+         ends_with(name, "deccam.2.weight");
+}
+
 // The spread of a tensor that is neither constant nor a layer norm. Embeddings have the official standard
 // deviation; matrices the fan-in rule of torch.nn.Linear, and biases none.
 double uniform_bound(const TensorSpec& spec) {
@@ -42,7 +49,8 @@ double uniform_bound(const TensorSpec& spec) {
   for (std::size_t i = 1; i < spec.shape.size(); ++i) fan_in *= static_cast<double>(spec.shape[i]);
   // CLIP multiplies by its last projection from the left, so its rows are the inputs.
   if (ends_with(spec.name, "visual.proj")) fan_in = static_cast<double>(spec.shape[0]);
-  return 1.0 / std::sqrt(fan_in);
+  const double gain = is_last_of_head(spec.name) ? kHeadGain : 1.0;
+  return gain / std::sqrt(fan_in);
 }
 
 // Sines and cosines of a token's row and column, a quarter of the width each, after a first row of zeros for

@@ -62,10 +62,11 @@ class UnitBuilder {
 
   // The paper's Stage 2 on one unit.
   void compute(UnitWork& work) {
-    if (!work.predicted) predict_unit(work, workspace_.network());
+    const NetworkSource network = [this]() -> Network& { return workspace_.network(); };
+    if (!work.predicted) predict_unit(work, network);
     judge_unit(work, thresholds_);
     if (!work.refined) {
-      refine_unit(work, workspace_.network(), thresholds_);
+      refine_unit(work, network, thresholds_);
       judge_unit(work, thresholds_);
     }
   }
@@ -107,7 +108,7 @@ class UnitBuilder {
 
 BuildSummary build(const BuildConfig& config, const RunOptions& options) {
   const auto start = std::chrono::steady_clock::now();
-  const filters::Thresholds limits = thresholds(config);
+  const filters::Thresholds limits = needs_network(config) ? thresholds(config) : filters::Thresholds{};
   Workspace workspace(config, options);
   const StageKeys keys =
       stage_keys(config, limits, workspace.ingest(), workspace.assets(), workspace.device_key());

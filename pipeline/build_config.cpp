@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <regex>
 #include <set>
 
@@ -18,11 +19,12 @@ void require(bool holds, const std::string& where, const std::string& what) {
   if (!holds) throw ConfigError(where + ": " + what);
 }
 
-loaders::DatasetOptions parse_dataset(const json& object, const std::string& where) {
-  loaders::DatasetOptions options;
+DatasetConfig parse_dataset(const json& object, const std::string& where) {
+  DatasetConfig options;
   std::string root;
   std::string annotations;
   std::string images;
+  std::string role(to_string(options.role));
   JsonFields fields(object, where);
   fields.require("name", options.name);
   fields.require("format", options.format);
@@ -31,10 +33,16 @@ loaders::DatasetOptions parse_dataset(const json& object, const std::string& whe
   options.split = "train";
   fields.read("split", options.split);
   fields.read("images", images);
+  fields.read("role", role);
   fields.finish();
   require_one_of(options.format, loaders::dataset_formats(), where + ": format");
   require(std::regex_match(options.name, std::regex("[A-Za-z0-9_.-]+")), where,
           "\"name\" may hold letters, digits, '.', '_' and '-' only, got \"" + options.name + "\"");
+  require_one_of(role, role_names(), where + ": role");
+  options.role = role_from_string(role);
+  require(options.role != Role::truth || options.format == "prima", where,
+          "\"role\": \"truth\" needs a format that gives bodies, which is \"prima\"; got \"" +
+              options.format + "\". For keypoints alone use \"2d_only\"");
   options.root = root;
   options.annotations = annotations;
   options.images = images;
@@ -140,7 +148,9 @@ BuildConfig parse_build_config(const json& merged, const std::string& where) {
   if (const json* network = fields.child("network")) {
     parse_network(*network, where + ": network", config.network);
   } else {
-    throw ConfigError(where + ": the key \"network\" is missing");
+    require(!needs_network(config), where,
+            "the key \"network\" is missing; a dataset of role \"pseudo\", the default, gets its labels from "
+            "it. Datasets that bring theirs have the role \"truth\" or \"2d_only\"");
   }
   if (const json* tta = fields.child("tta")) parse_tta(*tta, where + ": tta", config.tta);
   if (const json* filter = fields.child("filter")) parse_filter(*filter, where + ": filter", config.filter);
@@ -168,6 +178,11 @@ BuildConfig load_build_config(const std::vector<fs::path>& files) {
   BuildConfig config = parse_build_config(layers.resolved, layers.where);
   config.as_written = std::move(layers.as_written);
   return config;
+}
+
+bool needs_network(const BuildConfig& config) {
+  return std::any_of(config.datasets.begin(), config.datasets.end(),
+                     [](const DatasetConfig& dataset) { return dataset.role == Role::pseudo; });
 }
 
 filters::Thresholds thresholds(const BuildConfig& config) {

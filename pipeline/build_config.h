@@ -13,8 +13,14 @@
 #include "filters/calibrate.h"
 #include "filters/fidelity.h"
 #include "loaders/dataset.h"
+#include "pipeline/role.h"
 
 namespace q3d::pipeline {
+
+// How a dataset is read, and what the build makes of it.
+struct DatasetConfig : loaders::DatasetOptions {
+  Role role = Role::pseudo;
+};
 
 struct NetworkConfig {
   std::filesystem::path checkpoint;  // safetensors, official parameter names
@@ -52,8 +58,8 @@ struct ShardConfig {
 struct BuildConfig {
   std::string name = "quadruped3d";
   std::string version = "1.0.0";  // semantic version of the dataset, the user's own
-  std::vector<loaders::DatasetOptions> datasets;
-  NetworkConfig network;
+  std::vector<DatasetConfig> datasets;
+  NetworkConfig network;  // without paths when the config names none
   TtaConfig tta;
   FilterConfig filter;
   ShardConfig shards;
@@ -67,6 +73,10 @@ BuildConfig load_build_config(const std::vector<std::filesystem::path>& files);
 
 // Checks and converts merged JSON; `where` names it in messages.
 BuildConfig parse_build_config(const nlohmann::json& json, const std::string& where);
+
+// Whether a dataset has the role `pseudo`. A build that needs no network takes no notice of `network`, `tta`
+// and `filter`.
+bool needs_network(const BuildConfig& config);
 
 // The thresholds of a calibrated config. Throws ConfigError naming `calibrate` when they are absent.
 filters::Thresholds thresholds(const BuildConfig& config);

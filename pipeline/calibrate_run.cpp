@@ -11,6 +11,7 @@
 #include <stdexcept>
 
 #include "manifests/atomic_file.h"
+#include "pipeline/errors.h"
 #include "pipeline/interrupt.h"
 #include "pipeline/progress.h"
 #include "pipeline/stage_store.h"
@@ -24,8 +25,8 @@ namespace {
 
 constexpr double kNoLimit = std::numeric_limits<double>::infinity();
 
-// L_proj of every candidate's prediction; NaN for the failed. What an earlier run predicted is not predicted
-// again.
+// L_proj of every candidate's prediction; NaN for the failed and for those that are not predicted. What an
+// earlier run predicted is not predicted again.
 std::vector<double> initial_errors(const BuildConfig& config, Workspace& workspace) {
   const Ingest& ingest = workspace.ingest();
   StageStore predictions(workspace.out(), "predict",
@@ -44,7 +45,7 @@ std::vector<double> initial_errors(const BuildConfig& config, Workspace& workspa
   };
   flow.decode = [&](UnitWork& work) { decode_unit(work, config.shards, nullptr); };
   flow.compute = [&](UnitWork& work) {
-    if (!work.predicted) predict_unit(work, workspace.network());
+    if (!work.predicted) predict_unit(work, [&]() -> Network& { return workspace.network(); });
   };
   flow.write = [&](UnitWork& work) {
     if (!work.predicted_before) predictions.save(*work.unit, to_table(*work.predicted));
@@ -124,6 +125,11 @@ std::int64_t adapt_until_enough(std::vector<filters::CalibrationSample>& pool,
 }  // namespace
 
 CalibrationSummary calibrate(const BuildConfig& config, const RunOptions& options) {
+  if (!needs_network(config)) {
+    throw ConfigError(
+        "no dataset of the config has the role \"pseudo\", so no label is predicted and there is nothing to "
+        "calibrate: `build` needs no thresholds here");
+  }
   const auto start = std::chrono::steady_clock::now();
   Workspace workspace(config, options);
   const std::vector<double> errors = initial_errors(config, workspace);

@@ -5,12 +5,14 @@
 #include <opencv2/imgproc.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include "loaders/crop.h"
 #include "loaders/encode.h"
 #include "loaders/stored_crop.h"
 #include "manifests/atomic_file.h"
+#include "pipeline/annotated_body.h"
 #include "pipeline/unit_steps.h"
 
 namespace q3d::pipeline {
@@ -38,14 +40,14 @@ cv::Point to_tile(float x, float y) {
 
 void draw_keypoints(cv::Mat& tile, const manifests::ShardSample& sample) {
   const CropKeypoints annotated = crop_keypoints(sample.record);
+  const bool has_body = has_projection(sample.projected_2d);
   for (std::size_t k = 0; k < manifests::kNumKeypoints; ++k) {
-    const cv::Point projected = to_tile(sample.projected_2d[2 * k], sample.projected_2d[2 * k + 1]);
+    const cv::Point point = to_tile(annotated[3 * k], annotated[3 * k + 1]);
     const bool visible = annotated[3 * k + 2] > 0;
-    if (visible) {
-      const cv::Point point = to_tile(annotated[3 * k], annotated[3 * k + 1]);
-      cv::line(tile, point, projected, kProjected, 1, cv::LINE_AA);
-      cv::circle(tile, point, 3, kAnnotated, cv::FILLED, cv::LINE_AA);
-    }
+    if (visible) cv::circle(tile, point, 3, kAnnotated, cv::FILLED, cv::LINE_AA);
+    if (!has_body) continue;
+    const cv::Point projected = to_tile(sample.projected_2d[2 * k], sample.projected_2d[2 * k + 1]);
+    if (visible) cv::line(tile, point, projected, kProjected, 1, cv::LINE_AA);
     cv::drawMarker(tile, projected, kProjected, cv::MARKER_TILTED_CROSS, 6, 1, cv::LINE_AA);
   }
 }
@@ -57,9 +59,14 @@ void draw_caption(cv::Mat& cell, const manifests::ShardSample& sample) {
   };
   const std::string& id = sample.record.id;
   write(id.size() <= 40 ? id : "..." + id.substr(id.size() - 37), 0);
-  write(fmt::format("{}  L {:.3f} -> {:.3f}", manifests::to_string(sample.label_kind),
-                    sample.judgement.initial_error, sample.judgement.final_error),
-        1);
+  const manifests::Judgement& judgement = sample.judgement;
+  std::string label(manifests::to_string(sample.label_kind));
+  if (!std::isnan(judgement.initial_error)) {
+    label += fmt::format("  L {:.3f} -> {:.3f}", judgement.initial_error, judgement.final_error);
+  } else if (!std::isnan(judgement.final_error)) {
+    label += fmt::format("  L {:.3f}", judgement.final_error);
+  }
+  write(label, 1);
 }
 
 }  // namespace

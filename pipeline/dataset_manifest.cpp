@@ -25,36 +25,47 @@ ordered_json to_json(const Counts& counts) {
           {"failed", counts.failed}};
 }
 
+bool is_kept(const manifests::Judgement& judgement) {
+  return judgement.verdict == Verdict::retained || judgement.verdict == Verdict::refined;
+}
+
 // Counts and mean errors by any label of the candidates.
 class Statistics {
  public:
   void add(const std::string& label, const manifests::Judgement& judgement) {
     Group& group = groups_[label.empty() ? "unknown" : label];
     group.counts.add(judgement.verdict);
-    if (judgement.verdict == Verdict::retained || judgement.verdict == Verdict::refined) {
-      group.initial += judgement.initial_error;
-      group.final += judgement.final_error;
+    if (is_kept(judgement)) {
+      group.initial.add(judgement.initial_error);
+      group.final.add(judgement.final_error);
     }
   }
   ordered_json to_json() const {
     ordered_json object = ordered_json::object();
     for (const auto& [label, group] : groups_) {
       ordered_json entry = pipeline::to_json(group.counts);
-      const auto kept = static_cast<double>(group.counts.retained + group.counts.refined);
-      if (kept > 0) {
-        entry["mean_initial_error_of_kept"] = group.initial / kept;
-        entry["mean_final_error_of_kept"] = group.final / kept;
-      }
+      if (group.initial.count > 0) entry["mean_initial_error_of_kept"] = group.initial.mean();
+      if (group.final.count > 0) entry["mean_final_error_of_kept"] = group.final.mean();
       object[label] = std::move(entry);
     }
     return object;
   }
 
  private:
+  struct Mean {  // of the errors that were computed
+    double sum = 0.0;
+    std::int64_t count = 0;
+    void add(double error) {
+      if (std::isnan(error)) return;
+      sum += error;
+      ++count;
+    }
+    double mean() const { return sum / static_cast<double>(count); }
+  };
   struct Group {
     Counts counts;
-    double initial = 0.0;
-    double final = 0.0;
+    Mean initial;
+    Mean final;
   };
   std::map<std::string, Group> groups_;
 };
@@ -81,6 +92,32 @@ ordered_json statistics(const Ingest& ingest, const std::vector<manifests::Judge
   object["by_family"] = by_family.to_json();
   object["by_species"] = by_species.to_json();
   return object;
+}
+
+ordered_json count_labels(const Ingest& ingest, const std::vector<manifests::Judgement>& judgements) {
+  using manifests::LabelKind;
+  ordered_json labels = ordered_json::object();
+  for (const LabelKind kind :
+       {LabelKind::truth, LabelKind::retained, LabelKind::refined, LabelKind::two_d_only}) {
+    std::int64_t count = 0;
+    for (std::size_t i = 0; i < judgements.size(); ++i) {
+      count += is_kept(judgements[i]) && label_kind(ingest.candidates[i].role, judgements[i].verdict) == kind;
+    }
+    labels[std::string(manifests::to_string(kind))] = count;
+  }
+  return labels;
+}
+
+// Null where no dataset needed them.
+ordered_json describe_thresholds(const DatasetInputs& inputs) {
+  if (!needs_network(*inputs.config)) return nullptr;
+  return {{"tau_low", inputs.thresholds->tau_low},
+          {"tau_high", inputs.thresholds->tau_high},
+          {"delta", inputs.thresholds->delta}};
+}
+
+ordered_json text_or_null(const std::string& text) {
+  return text.empty() ? ordered_json(nullptr) : ordered_json(text);
 }
 
 // Shortest text that reads back as the same number; empty for NaN.
@@ -142,17 +179,15 @@ std::string dataset_json(const DatasetInputs& inputs, const std::vector<manifest
                                  {"content_id", content_id(shards)},
                                  {"toolkit", Q3D_VERSION},
                                  {"counts", to_json(counts)},
-                                 {"thresholds",
-                                  {{"tau_low", inputs.thresholds->tau_low},
-                                   {"tau_high", inputs.thresholds->tau_high},
-                                   {"delta", inputs.thresholds->delta}}},
+                                 {"labels", count_labels(*inputs.ingest, judgements)},
+                                 {"thresholds", describe_thresholds(inputs)},
                                  {"statistics", statistics(*inputs.ingest, judgements)},
                                  {"provenance",
                                   {{"config", inputs.config->as_written},
                                    {"annotations", inputs.ingest->annotation_digests},
-                                   {"checkpoint_sha256", inputs.assets->checkpoint},
-                                   {"smal_asset_sha256", inputs.assets->smal_asset},
-                                   {"device", inputs.device_key},
+                                   {"checkpoint_sha256", text_or_null(inputs.assets->checkpoint)},
+                                   {"smal_asset_sha256", text_or_null(inputs.assets->smal_asset)},
+                                   {"device", text_or_null(inputs.device_key)},
                                    {"stage_keys",
                                     {{"ingest", keys.ingest},
                                      {"predict", keys.predict},
@@ -174,7 +209,7 @@ std::string verdicts_csv(const Ingest& ingest, const std::vector<manifests::Judg
     for (std::size_t i = unit.first; i < unit.first + unit.count; ++i) {
       const manifests::SampleRecord& record = ingest.candidates[i].record;
       const manifests::Judgement& judgement = judgements[i];
-      const bool kept = judgement.verdict == Verdict::retained || judgement.verdict == Verdict::refined;
+      const bool kept = is_kept(judgement);
       const bool judged = !std::isnan(judgement.initial_error);
       text += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", csv_field(record.id),
                           manifests::to_string(judgement.verdict), manifests::to_string(judgement.reason),
@@ -225,6 +260,7 @@ DatasetManifest read_dataset_manifest(const std::filesystem::path& given) {
     manifest.counts = {counts.at("candidates").get<std::int64_t>(), counts.at("retained").get<std::int64_t>(),
                        counts.at("refined").get<std::int64_t>(), counts.at("discarded").get<std::int64_t>(),
                        counts.at("failed").get<std::int64_t>()};
+    manifest.labels = document.at("labels").get<std::map<std::string, std::int64_t>>();
     manifest.verdicts_sha256 = document.at("verdicts").at("sha256").get<std::string>();
     manifest.reasons = document.at("statistics").at("reasons").get<std::map<std::string, std::int64_t>>();
     for (const json& shard : document.at("shards")) {

@@ -42,6 +42,7 @@ struct DatasetManifest {
   std::string content_id;  // SHA-256 over the ordered shard digests
   int schema = 0;
   Counts counts;
+  std::map<std::string, std::int64_t> labels;  // kept samples by kind of label: truth, retained, ...
   std::vector<ShardEntry> shards;
   std::string verdicts_sha256;
   std::map<std::string, std::int64_t> reasons;  // of the discarded and the failed
@@ -52,7 +53,7 @@ std::string content_id(const std::vector<ShardEntry>& shards);
 
 struct DatasetInputs {
   const BuildConfig* config = nullptr;
-  const filters::Thresholds* thresholds = nullptr;
+  const filters::Thresholds* thresholds = nullptr;  // not read where no network is needed
   const Ingest* ingest = nullptr;
   const AssetDigests* assets = nullptr;
   const StageKeys* keys = nullptr;

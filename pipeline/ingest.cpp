@@ -47,6 +47,15 @@ std::string without_root(std::string text, const std::filesystem::path& root) {
   return text;
 }
 
+// A label must have what its role promises.
+void check_role(Role role, manifests::SampleRecord& record) {
+  if (role != Role::truth || record.failure != Reason::none) return;
+  if (record.truth && record.truth->has_pose) return;
+  record.failure = Reason::pose_missing;
+  record.failure_detail =
+      "pose: got nothing, or zeros throughout; expected 35 rotations, since the dataset's role is \"truth\"";
+}
+
 // A picture that cannot be read now is a failed sample, never a failed build.
 void digest_pictures(std::vector<Candidate>& candidates, manifests::DigestCache& digests) {
   tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t i) {
@@ -71,7 +80,8 @@ std::vector<Unit> cut_units(const std::vector<Candidate>& candidates, std::size_
     unit.count = std::min(unit_size, candidates.size() - first);
     std::string text;
     for (std::size_t i = first; i < first + unit.count; ++i) {
-      text += manifests::record_digest(candidates[i].record) + ' ' + candidates[i].image_sha256 + '\n';
+      text += manifests::record_digest(candidates[i].record) + ' ' + candidates[i].image_sha256 + ' ';
+      text += std::string(to_string(candidates[i].role)) + '\n';
     }
     unit.input_digest = manifests::sha256(text);
     units.push_back(std::move(unit));
@@ -90,7 +100,8 @@ Ingest ingest(const BuildConfig& config, manifests::DigestCache& digests) {
     result.annotation_digests[name] = digests.digest(annotation_path(options));
     for (auto& record : dataset.records) {
       record.failure_detail = without_root(std::move(record.failure_detail), options.root);
-      result.candidates.push_back({std::move(record), {}});
+      check_role(options.role, record);
+      result.candidates.push_back({std::move(record), {}, options.role});
     }
     for (const auto& note : dataset.notes) result.notes.push_back(name + ": " + note);
   }

@@ -16,6 +16,7 @@ namespace q3d::pipeline {
 struct Candidate {
   manifests::SampleRecord record;
   std::string image_sha256;  // empty when the picture could not be read
+  Role role = Role::pseudo;  // its dataset's
 };
 
 // A fixed run of candidates in ingest order: the grain of resume and of determinism. It becomes one shard.
@@ -23,7 +24,7 @@ struct Unit {
   std::int64_t index = 0;
   std::size_t first = 0;  // into Ingest::candidates
   std::size_t count = 0;
-  std::string input_digest;  // over the records and pictures of the unit
+  std::string input_digest;  // over the records, pictures and roles of the unit
 };
 
 struct Ingest {
@@ -34,7 +35,8 @@ struct Ingest {
 };
 
 // Loads every dataset and digests every picture (in parallel; unchanged files come from the cache). Throws
-// std::runtime_error for an annotation file that cannot be read, Interrupted.
+// A record whose role asks for a body and that gives no pose is failed. Throws std::runtime_error for an
+// annotation file that cannot be read, Interrupted.
 Ingest ingest(const BuildConfig& config, manifests::DigestCache& digests);
 
 }  // namespace q3d::pipeline

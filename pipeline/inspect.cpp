@@ -37,22 +37,25 @@ ordered_json describe_judgement(const manifests::Judgement& judgement) {
 ordered_json describe_whole(const fs::path& shard, const manifests::ShardSample& sample) {
   nlohmann::json record;
   manifests::to_json(record, sample.record);
-  return {{"shard", shard.string()},
-          {"label", manifests::to_string(sample.label_kind)},
-          {"judgement", describe_judgement(sample.judgement)},
-          {"image_sha256", sample.image_sha256},
-          {"image_size_px", {sample.image_width_px, sample.image_height_px}},
-          {"stored_crop",
-           {{"side_px", sample.crop_side_px},
-            {"bytes", sample.crop.size()},
-            {"from_image", sample.crop_from_image}}},
-          {"camera", sample.camera},
-          {"trans", sample.trans},
-          {"betas", sample.betas},
-          {"pose", sample.pose},
-          {"keypoints_3d", sample.keypoints_3d},
-          {"projected_2d", sample.projected_2d},
-          {"record", record}};
+  return {
+      {"shard", shard.string()},
+      {"label", manifests::to_string(sample.label_kind)},
+      {"judgement", describe_judgement(sample.judgement)},
+      {"image_sha256", sample.image_sha256},
+      {"image_size_px", {sample.image_width_px, sample.image_height_px}},
+      {"stored_crop",
+       {{"side_px", sample.crop_side_px},
+        {"bytes", sample.crop.size()},
+        {"from_image", sample.crop_from_image}}},
+      {"has",
+       {{"pose", sample.has_pose}, {"betas", sample.has_betas}, {"keypoints_3d", sample.has_keypoints_3d}}},
+      {"camera", sample.camera},
+      {"trans", sample.trans},
+      {"betas", sample.betas},
+      {"pose", sample.pose},
+      {"keypoints_3d", sample.keypoints_3d},
+      {"projected_2d", sample.projected_2d},
+      {"record", record}};
 }
 
 ordered_json describe_shard(const fs::path& path) {

@@ -11,10 +11,13 @@ namespace {
 using manifests::ShardSample;
 using manifests::Verdict;
 
+// What of a kept candidate's body is a label: all that a network gives, of a truth what the file gives.
 void set_label(ShardSample& sample, const BodyPrediction& body) {
-  sample.has_pose = true;
-  sample.has_betas = true;
-  sample.has_keypoints_3d = true;
+  const bool is_truth = sample.label_kind == manifests::LabelKind::truth;
+  const bool has_body = sample.label_kind != manifests::LabelKind::two_d_only;
+  sample.has_pose = has_body && (!is_truth || sample.record.truth->has_pose);
+  sample.has_betas = has_body && (!is_truth || sample.record.truth->has_betas);
+  sample.has_keypoints_3d = has_body && (!is_truth || sample.record.truth->has_keypoints_3d);
   sample.pose = body.rotations;
   sample.betas = body.betas;
   sample.camera = body.camera;
@@ -54,8 +57,8 @@ std::vector<ShardSample> shard_samples(const UnitWork& work) {
     sample.record = work.candidates[i].record;
     sample.image_sha256 = work.candidates[i].image_sha256;
     sample.judgement = judgement;
+    sample.label_kind = label_kind(work.candidates[i].role, judgement.verdict);
     const bool refined = judgement.verdict == Verdict::refined;
-    sample.label_kind = refined ? manifests::LabelKind::refined : manifests::LabelKind::retained;
     set_label(sample, refined ? *refined_bodies.at(i) : (*work.predicted)[i].body);
     set_picture(sample, work.decoded[i]);
   }

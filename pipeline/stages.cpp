@@ -15,7 +15,7 @@ namespace {
 using nlohmann::json;
 
 // Raise a number when a change of the code changes what the stage writes.
-constexpr int kIngestCode = 1;
+constexpr int kIngestCode = 2;
 constexpr int kPredictCode = 1;
 constexpr int kFidelityCode = 1;
 constexpr int kRefineCode = 1;
@@ -47,6 +47,9 @@ AssetDigests digest_assets(const NetworkConfig& network, manifests::DigestCache&
 
 std::string predict_key(const BuildConfig& config, const AssetDigests& assets,
                         const std::string& device_key) {
+  if (!needs_network(config)) {
+    return key_of("predict", kPredictCode, {{"network", nullptr}, {"unit_size", config.shards.unit_size}});
+  }
   return key_of("predict", kPredictCode,
                 {{"checkpoint", assets.checkpoint},
                  {"smal_asset", assets.smal_asset},
@@ -61,21 +64,24 @@ StageKeys stage_keys(const BuildConfig& config, const filters::Thresholds& thres
   StageKeys keys;
   keys.ingest = ingest_key(config, ingest);
   keys.predict = predict_key(config, assets, device_key);
-  keys.fidelity = key_of("fidelity", kFidelityCode,
-                         {{"predict", keys.predict},
-                          {"tau_low", thresholds.tau_low},
-                          {"tau_high", thresholds.tau_high},
-                          {"delta", thresholds.delta},
-                          {"gain_window", thresholds.gain_window}});
-  keys.refine = key_of("refine", kRefineCode,
-                       {{"fidelity", keys.fidelity},
-                        {"objective", config.tta.objective},
-                        {"learning_rate", config.tta.learning_rate},
-                        {"aux_weight", config.tta.aux_weight},
-                        {"reproj_weight", config.tta.reproj_weight},
-                        {"iterations_min", config.tta.iterations_min},
-                        {"iterations_max", config.tta.iterations_max},
-                        {"batch", config.tta.batch}});
+  json fidelity = {{"predict", keys.predict}};
+  json refine = json::object();
+  if (needs_network(config)) {
+    fidelity.update({{"tau_low", thresholds.tau_low},
+                     {"tau_high", thresholds.tau_high},
+                     {"delta", thresholds.delta},
+                     {"gain_window", thresholds.gain_window}});
+    refine.update({{"objective", config.tta.objective},
+                   {"learning_rate", config.tta.learning_rate},
+                   {"aux_weight", config.tta.aux_weight},
+                   {"reproj_weight", config.tta.reproj_weight},
+                   {"iterations_min", config.tta.iterations_min},
+                   {"iterations_max", config.tta.iterations_max},
+                   {"batch", config.tta.batch}});
+  }
+  keys.fidelity = key_of("fidelity", kFidelityCode, std::move(fidelity));
+  refine["fidelity"] = keys.fidelity;
+  keys.refine = key_of("refine", kRefineCode, std::move(refine));
   keys.shards = key_of("shards", kShardsCode,
                        {{"refine", keys.refine},
                         {"schema", manifests::kShardSchema},

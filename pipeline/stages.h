@@ -20,6 +20,7 @@ namespace q3d::pipeline {
 
 inline constexpr std::size_t kShortKey = 12;  // hex digits of a key that appear in a folder's name
 
+// Empty when the build needs no network.
 struct AssetDigests {
   std::string checkpoint;
   std::string smal_asset;
@@ -27,7 +28,8 @@ struct AssetDigests {
 // Throws std::runtime_error when a file is missing.
 AssetDigests digest_assets(const NetworkConfig& network, manifests::DigestCache& digests);
 
-// Keys are 64 hex digits. device_key is Network::device_key(), or what it would be.
+// Keys are 64 hex digits. device_key is pipeline::device_key(), or empty for a build
+// that needs no network: its keys hold nothing of network, thresholds and adaptation.
 struct StageKeys {
   std::string ingest;  // annotation files and every unit's input digest
   std::string predict;

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "filters/metrics.h"
 #include "loaders/box.h"
@@ -12,6 +13,7 @@
 #include "loaders/encode.h"
 #include "loaders/image.h"
 #include "loaders/stored_crop.h"
+#include "pipeline/annotated_body.h"
 #include "pipeline/interrupt.h"
 
 namespace q3d::pipeline {
@@ -21,18 +23,23 @@ using filters::Band;
 using manifests::Reason;
 using manifests::Verdict;
 
-Wanted wanted(const UnitWork& work, std::size_t i, const filters::Thresholds* thresholds) {
-  if (work.candidates[i].record.failure != Reason::none) return {};
-  if (!work.predicted) return {true, thresholds != nullptr && !work.shard_before};
-  if (thresholds == nullptr) return {};
+// Nothing when the picture is not needed at all.
+std::optional<Wanted> wanted(const UnitWork& work, std::size_t i, const filters::Thresholds* thresholds) {
+  if (work.candidates[i].record.failure != Reason::none) return std::nullopt;
+  const bool is_pseudo = work.candidates[i].role == Role::pseudo;
+  const bool makes_shard = thresholds != nullptr && !work.shard_before;
+  if (!work.predicted) return Wanted{is_pseudo, makes_shard};
+  if (thresholds == nullptr || (*work.predicted)[i].failure != Reason::none) return std::nullopt;
+  if (!is_pseudo) return makes_shard ? std::optional(Wanted{false, true}) : std::nullopt;
   const double error = initial_error(work.candidates[i], (*work.predicted)[i]);
-  if (std::isnan(error)) return {};
+  if (std::isnan(error)) return std::nullopt;
   const Band band = filters::band(error, *thresholds);
   const bool adapts = band == Band::refine && !work.refined;
   const bool may_be_kept = work.refined ? work.judgements[i].verdict == Verdict::retained ||
                                               work.judgements[i].verdict == Verdict::refined
                                         : band != Band::discard;
-  return {adapts, may_be_kept && !work.shard_before};
+  const bool stores = may_be_kept && makes_shard;
+  return adapts || stores ? std::optional(Wanted{adapts, stores}) : std::nullopt;
 }
 
 void store_crop(DecodedSample& sample, const cv::Mat& rgb, const cv::Mat& mask, const loaders::SquareBox& box,
@@ -53,6 +60,33 @@ manifests::Judgement failed(Reason reason, const std::string& detail) {
   judgement.reason = reason;
   judgement.detail = detail;
   return judgement;
+}
+
+// What the network has no part in is kept as it came.
+manifests::Judgement judge_annotated(const Candidate& candidate, const BodyPrediction& body) {
+  manifests::Judgement judgement;
+  judgement.verdict = Verdict::retained;
+  if (has_projection(body.keypoints_2d)) {
+    judgement.final_error = filters::projection_error(body.keypoints_2d, crop_keypoints(candidate.record))
+                                .value_or(std::numeric_limits<double>::quiet_NaN());
+  }
+  return judgement;
+}
+
+manifests::Judgement judge_predicted(const Candidate& candidate, const PredictedSample& predicted,
+                                     const filters::Thresholds& thresholds) {
+  if (predicted.failure != Reason::none) return failed(predicted.failure, predicted.detail);
+  if (candidate.role != Role::pseudo) return judge_annotated(candidate, predicted.body);
+  return filters::judge_initial(initial_error(candidate, predicted), thresholds);
+}
+
+// The body of a candidate whose role is not `pseudo`, and what its label will lack.
+void take_annotated_body(const Candidate& candidate, PredictedSample& sample) {
+  sample.body = no_body();
+  if (candidate.role != Role::truth) return;
+  sample.body = annotated_body(*candidate.record.truth);
+  const std::string missing = missing_parts(*candidate.record.truth);
+  if (!missing.empty()) sample.detail += (sample.detail.empty() ? "" : "; ") + missing;
 }
 
 }  // namespace
@@ -102,7 +136,7 @@ CropKeypoints crop_keypoints(const manifests::SampleRecord& record) {
 
 double initial_error(const Candidate& candidate, const PredictedSample& predicted) {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-  if (predicted.failure != Reason::none) return kNone;
+  if (predicted.failure != Reason::none || candidate.role != Role::pseudo) return kNone;
   return filters::projection_error(predicted.body.keypoints_2d, crop_keypoints(candidate.record))
       .value_or(kNone);
 }
@@ -111,13 +145,13 @@ void decode_unit(UnitWork& work, const ShardConfig& shards, const filters::Thres
   work.decoded.assign(work.candidates.size(), {});
   tbb::parallel_for(std::size_t{0}, work.candidates.size(), [&](std::size_t i) {
     if (interrupted()) return;
-    const Wanted want = wanted(work, i, thresholds);
-    if (want.patch || want.stored_crop)
-      work.decoded[i] = decode_sample(work.candidates[i].record, want, shards);
+    if (const auto want = wanted(work, i, thresholds)) {
+      work.decoded[i] = decode_sample(work.candidates[i].record, *want, shards);
+    }
   });
 }
 
-void predict_unit(UnitWork& work, Network& network) {
+void predict_unit(UnitWork& work, const NetworkSource& network) {
   if (work.predicted) return;
   std::vector<PredictedSample> samples(work.candidates.size());
   std::vector<PatchView> patches;
@@ -131,10 +165,15 @@ void predict_unit(UnitWork& work, Network& network) {
     samples[i].image_height_px = decoded.image_height_px;
     samples[i].has_mask = decoded.has_mask;
     if (samples[i].failure != Reason::none) continue;
+    if (work.candidates[i].role != Role::pseudo) {
+      take_annotated_body(work.candidates[i], samples[i]);
+      continue;
+    }
     patches.emplace_back(decoded.patch);
     positions.push_back(i);
   }
-  const std::vector<BodyPrediction> bodies = network.predict(patches);
+  std::vector<BodyPrediction> bodies;
+  if (!patches.empty()) bodies = network().predict(patches);
   for (std::size_t j = 0; j < bodies.size(); ++j) {
     PredictedSample& sample = samples[positions[j]];
     if (is_finite(bodies[j])) {
@@ -150,11 +189,7 @@ void predict_unit(UnitWork& work, Network& network) {
 void judge_unit(UnitWork& work, const filters::Thresholds& thresholds) {
   work.judgements.assign(work.candidates.size(), {});
   for (std::size_t i = 0; i < work.candidates.size(); ++i) {
-    const PredictedSample& predicted = (*work.predicted)[i];
-    work.judgements[i] =
-        predicted.failure != Reason::none
-            ? failed(predicted.failure, predicted.detail)
-            : filters::judge_initial(initial_error(work.candidates[i], predicted), thresholds);
+    work.judgements[i] = judge_predicted(work.candidates[i], (*work.predicted)[i], thresholds);
   }
   if (work.refined) {
     for (const RefinedSample& refined : *work.refined) {
@@ -170,7 +205,7 @@ void judge_unit(UnitWork& work, const filters::Thresholds& thresholds) {
   }
 }
 
-void refine_unit(UnitWork& work, Network& network, const filters::Thresholds& thresholds) {
+void refine_unit(UnitWork& work, const NetworkSource& network, const filters::Thresholds& thresholds) {
   if (work.refined) return;
   std::vector<AdaptRequest> requests;
   std::vector<RefinedSample> samples;
@@ -186,7 +221,8 @@ void refine_unit(UnitWork& work, Network& network, const filters::Thresholds& th
     request.gain_window = thresholds.gain_window;
     samples.emplace_back().sample = i;
   }
-  std::vector<AdaptOutcome> outcomes = network.adapt(requests);
+  std::vector<AdaptOutcome> outcomes;
+  if (!requests.empty()) outcomes = network().adapt(requests);
   for (std::size_t j = 0; j < outcomes.size(); ++j) {
     samples[j].curve = std::move(outcomes[j].curve);
     samples[j].body = outcomes[j].best;

@@ -2,6 +2,8 @@
 // unit's result does not depend on threads, on its neighbours, or on where an earlier run ended.
 #pragma once
 
+#include <functional>
+
 #include "filters/fidelity.h"
 #include "pipeline/build_config.h"
 #include "pipeline/network.h"
@@ -27,17 +29,23 @@ DecodedSample decode_sample(const manifests::SampleRecord& record, Wanted want, 
 // wanted; then no stored crops are made.
 void decode_unit(UnitWork& work, const ShardConfig& shards, const filters::Thresholds* thresholds);
 
-// Predicts every decoded candidate in batches inside the unit. A NaN is a failed sample.
-void predict_unit(UnitWork& work, Network& network);
+// Gives the network when it is first needed: a unit without pseudo labels needs none.
+using NetworkSource = std::function<Network&()>;
 
-// Fills work.judgements from what is known: failures, bands, and adaptation curves where there are any.
+// Predicts every decoded candidate of role `pseudo` in batches inside the unit; a NaN is a failed sample. The
+// others get the body that their annotation gives, or none.
+void predict_unit(UnitWork& work, const NetworkSource& network);
+
+// Fills work.judgements from what is known: failures, bands, and adaptation curves where there are any. What
+// is no pseudo label is retained as it came; L_proj of a truth, where it has a projection, is its final
+// error.
 void judge_unit(UnitWork& work, const filters::Thresholds& thresholds);
 
 // Adapts the middle band in batches inside the unit. Features are recomputed from the crops, so a resumed
 // build gives the same bits as one in a single go.
-void refine_unit(UnitWork& work, Network& network, const filters::Thresholds& thresholds);
+void refine_unit(UnitWork& work, const NetworkSource& network, const filters::Thresholds& thresholds);
 
-// The initial L_proj of a predicted candidate; NaN when it failed.
+// The initial L_proj of a predicted candidate; NaN when it failed or its role is not `pseudo`.
 double initial_error(const Candidate& candidate, const PredictedSample& predicted);
 
 }  // namespace q3d::pipeline

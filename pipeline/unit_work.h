@@ -11,14 +11,15 @@
 
 namespace q3d::pipeline {
 
-// What predict knows of one candidate: a body, or why there is none.
+// What predict knows of one candidate: the body of its label to be, from the network or, by its role, from
+// the annotation file; or why it failed.
 struct PredictedSample {
   manifests::Reason failure = manifests::Reason::none;
   std::string detail;  // of the failure, or a remark (a mask that was left out)
   int image_width_px = 0;
   int image_height_px = 0;
   bool has_mask = false;
-  BodyPrediction body;  // meaningful when failure is none
+  BodyPrediction body;  // meaningful when failure is none; no_body() for 2d_only
 };
 
 // What refine knows of one candidate of the middle band.

@@ -3,7 +3,10 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
+#include <map>
 #include <mutex>
 #include <set>
 #include <stdexcept>
@@ -13,6 +16,7 @@
 #include "manifests/atomic_file.h"
 #include "manifests/digest.h"
 #include "manifests/shard.h"
+#include "pipeline/annotated_body.h"
 #include "pipeline/dataset_manifest.h"
 #include "pipeline/interrupt.h"
 #include "pipeline/progress.h"
@@ -23,8 +27,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// float32 projection and its double re-computation differ by rounding only.
+// float32 projection and its double re-computation differ by rounding only: of numbers below 1 by this, of
+// larger ones by as much of them.
 constexpr double kProjectionTolerance = 1e-4;
+constexpr float kRotationTolerance = 1e-5F;
 constexpr double kFocalInCropUnits = 1000.0 / 256.0;
 
 class Verifier {
@@ -42,6 +48,7 @@ class Verifier {
       progress.advance(1);
     }
     check_books();
+    check_labels();
     check_strays();
     return summary_;
   }
@@ -84,6 +91,7 @@ class Verifier {
     });
     for (const manifests::ShardSample& sample : shard.samples) {
       ++summary_.samples;
+      ++labels_[std::string(manifests::to_string(sample.label_kind))];
       summary_.pictures += sample.crop.empty() ? 0 : 1;
       if (!ids_.insert(sample.record.id).second)
         problem(entry.file + ": sample " + sample.record.id + " occurs twice");
@@ -104,16 +112,52 @@ class Verifier {
     }
   }
 
-  // The stored 2D points are the projection of the stored body, and the error is theirs.
   void check_label(const ShardEntry& entry, const manifests::ShardSample& sample) {
-    if (!sample.has_keypoints_3d) return;
-    double worst = 0.0;
+    using manifests::LabelKind;
+    const bool is_predicted =
+        sample.label_kind == LabelKind::retained || sample.label_kind == LabelKind::refined;
+    const bool has_body = sample.has_pose || sample.has_betas || sample.has_keypoints_3d;
+    const bool is_whole = sample.has_pose && sample.has_betas && sample.has_keypoints_3d;
+    if ((is_predicted && !is_whole) || (sample.label_kind == LabelKind::truth && !sample.has_pose) ||
+        (sample.label_kind == LabelKind::two_d_only && has_body)) {
+      problem(fmt::format("{}: {}: a {} label with has_pose {}, has_betas {}, has_keypoints_3d {}",
+                          entry.file, sample.record.id, manifests::to_string(sample.label_kind),
+                          sample.has_pose, sample.has_betas, sample.has_keypoints_3d));
+    }
+    if (sample.label_kind == LabelKind::truth) check_truth(entry, sample);
+    if (is_predicted || has_projection(sample.projected_2d)) check_projection(entry, sample);
+  }
+
+  // The label of a truth is the annotation's own body.
+  void check_truth(const ShardEntry& entry, const manifests::ShardSample& sample) {
+    const auto& truth = sample.record.truth;
+    const BodyPrediction body = truth ? annotated_body(*truth) : no_body();
+    const bool is_equal =
+        truth && truth->has_pose == sample.has_pose && truth->has_betas == sample.has_betas &&
+        truth->has_keypoints_3d == sample.has_keypoints_3d &&
+        std::equal(body.rotations.begin(), body.rotations.end(), sample.pose.begin(),
+                   [](float a, float b) { return std::abs(a - b) <= kRotationTolerance; }) &&
+        body.betas == sample.betas && body.translation == sample.trans &&
+        body.keypoints_3d == sample.keypoints_3d &&
+        has_projection(body.keypoints_2d) == has_projection(sample.projected_2d);
+    if (is_equal) return;
+    problem(fmt::format("{}: {}: the label is not the body of the columns truth_*", entry.file,
+                        sample.record.id));
+  }
+
+  // The stored 2D points are the projection of the stored body, and the error is theirs.
+  void check_projection(const ShardEntry& entry, const manifests::ShardSample& sample) {
+    double worst = 0.0;  // relative for what lies far outside the crop
     for (int k = 0; k < manifests::kNumKeypoints; ++k) {
       const auto at = static_cast<std::size_t>(k);
       const double z = double{sample.keypoints_3d[3 * at + 2]} + sample.trans[2];
       for (std::size_t axis = 0; axis < 2; ++axis) {
         const double point = double{sample.keypoints_3d[3 * at + axis]} + sample.trans[axis];
-        worst = std::max(worst, std::abs(kFocalInCropUnits * point / z - sample.projected_2d[2 * at + axis]));
+        const double projected = kFocalInCropUnits * point / z;
+        const double difference =
+            std::abs(projected - sample.projected_2d[2 * at + axis]) / std::max(1.0, std::abs(projected));
+        worst =
+            std::isnan(difference) ? std::numeric_limits<double>::infinity() : std::max(worst, difference);
       }
     }
     if (!(worst <= kProjectionTolerance)) {
@@ -121,7 +165,8 @@ class Verifier {
                           sample.record.id, worst));
     }
     const auto error = filters::projection_error(sample.projected_2d, crop_keypoints(sample.record));
-    if (!error || std::abs(*error - sample.judgement.final_error) > kProjectionTolerance) {
+    if (!error ||
+        !(std::abs(*error - sample.judgement.final_error) <= kProjectionTolerance * std::max(1.0, *error))) {
       problem(fmt::format("{}: {}: final_error is {}, recomputed {}", entry.file, sample.record.id,
                           sample.judgement.final_error, error.value_or(std::nan(""))));
     }
@@ -151,6 +196,15 @@ class Verifier {
     }
   }
 
+  void check_labels() {
+    for (const auto& [kind, count] : manifest_.labels) {
+      if (labels_[kind] != count) {
+        problem(
+            fmt::format("the shards hold {} {} labels, dataset.json says {}", labels_[kind], kind, count));
+      }
+    }
+  }
+
   // A file that dataset.json does not list is not part of the dataset.
   void check_strays() {
     std::set<std::string> listed;
@@ -168,6 +222,7 @@ class Verifier {
   std::mutex mutex_;  // guards summary_.problems
   std::set<std::string> ids_;
   Counts labelled_;
+  std::map<std::string, std::int64_t> labels_;  // by kind
 };
 
 }  // namespace

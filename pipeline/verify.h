@@ -17,8 +17,8 @@ struct VerifySummary {
 };
 
 // Recomputes every digest from the bytes (no cache), reads every shard through its schema, decodes every
-// stored crop, and checks that counts, ids, verdicts and projections agree with each other. Problems are
-// listed, not thrown; throws std::runtime_error when `given` holds no readable dataset.json at all,
+// stored crop, and checks that counts, ids, verdicts, labels and projections agree with each other. Problems
+// are listed, not thrown; throws std::runtime_error when `given` holds no readable dataset.json at all,
 // Interrupted.
 VerifySummary verify(const std::filesystem::path& given, bool quiet);
 

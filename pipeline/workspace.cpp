@@ -31,8 +31,8 @@ Workspace::Workspace(const BuildConfig& config, const RunOptions& options)
       threads_(tbb::global_control::max_allowed_parallelism, flow_threads(options.threads)),
       lock_(made(options.out)),
       digests_(options.out / "digests.txt"),
-      assets_(digest_assets(config.network, digests_)),
-      device_key_(pipeline::device_key(config.network)),
+      assets_(needs_network(config) ? digest_assets(config.network, digests_) : AssetDigests{}),
+      device_key_(needs_network(config) ? pipeline::device_key(config.network) : std::string()),
       ingest_(pipeline::ingest(config, digests_)) {
   if (options_.quiet) return;
   fmt::print(stderr, "{} candidates in {} units\n", ingest_.candidates.size(), ingest_.units.size());

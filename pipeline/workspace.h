@@ -26,6 +26,7 @@ class Workspace {
   const std::filesystem::path& out() const { return options_.out; }
   const Ingest& ingest() const { return ingest_; }
   const AssetDigests& assets() const { return assets_; }
+  // Empty, like the digests of assets(), when no dataset needs the network.
   const std::string& device_key() const { return device_key_; }
   bool quiet() const { return options_.quiet; }
 

@@ -16,7 +16,8 @@ if [ -z "$config" ]; then
 fi
 
 layers=(--config "$config")
-if ! grep -q '"tau_low"' "$config"; then
+# Without a network there is nothing to calibrate: every dataset brings its labels.
+if grep -q '"network"' "$config" && ! grep -q '"tau_low"' "$config"; then
   # One thresholds file a config: thresholds of another pool or network would be wrong.
   thresholds=$out/thresholds-$(basename "$config" .json).json
   if [ -f "$thresholds" ]; then

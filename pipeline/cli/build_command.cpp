@@ -37,7 +37,11 @@ void print_summary(const BuildSummary& summary) {
   line("failed", counts.failed);
   for (const auto& [reason, count] : summary.dataset.reasons)
     fmt::print(stderr, "    {:<22} {}\n", reason, count);
-  fmt::print(stderr, "  {} shards in {}\n", summary.dataset.shards.size(), summary.folder.string());
+  fmt::print(stderr, "  labels    ");
+  for (const auto& [kind, count] : summary.dataset.labels) {
+    if (count > 0) fmt::print(stderr, "  {} {}", kind, count);
+  }
+  fmt::print(stderr, "\n  {} shards in {}\n", summary.dataset.shards.size(), summary.folder.string());
   fmt::print(stderr, "  every verdict: {}\n", (summary.folder / "verdicts.csv").string());
   fmt::print(stderr, "next: quadruped3d verify {0}\n      quadruped3d inspect {0} --sheet sheet.png\n",
              summary.folder.string());
@@ -50,6 +54,7 @@ nlohmann::ordered_json to_json(const BuildSummary& summary) {
           {"refined", counts.refined},
           {"discarded", counts.discarded},
           {"failed", counts.failed},
+          {"labels", summary.dataset.labels},
           {"shards", summary.dataset.shards.size()},
           {"dataset", summary.folder.string()},
           {"content_id", summary.dataset.content_id},
@@ -77,10 +82,13 @@ Command add_build(CLI::App& app) {
       "Examples:\n"
       "  quadruped3d build --config configs/sample.json --config out/thresholds.json --out out\n"
       "  quadruped3d build -c my.json -o out --json > summary.json\n"
+      "  quadruped3d build -c configs/world_pools/animal3d.json -o out/pools/animal3d\n"
       "A build that was killed goes on where it left off when the same command is run again, and ends with "
       "the same\n"
       "bytes. Bad pictures and records never stop it: they are counted, with reasons, in verdicts.csv.\n"
-      "Without thresholds in the config it stops and names `quadruped3d calibrate`.");
+      "Without thresholds in the config it stops and names `quadruped3d calibrate`. Datasets whose role is "
+      "\"truth\" or\n"
+      "\"2d_only\" bring their labels: they need neither thresholds nor a network (docs/config.md).");
   return [arguments] {
     const BuildSummary summary = build(load_build_config(arguments->configs), arguments->run);
     print_summary(summary);

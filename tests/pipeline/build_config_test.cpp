@@ -75,6 +75,7 @@ INSTANTIATE_TEST_SUITE_P(
         Mutation{"/datasets/0/format", "\"prma\"", "Did you mean \"prima\"?"},
         Mutation{"/datasets/0/rot", "\"x\"", "did you mean \"root\"?"},
         Mutation{"/datasets/0/name", "\"../x\"", "letters, digits"},
+        Mutation{"/datasets/0/role", "\"truht\"", "Did you mean \"truth\"?"},
         Mutation{"/network/dtype", "\"float16\"", "float32, bfloat16"},
         Mutation{"/network/batch", "0", "at least 1"},
         Mutation{"/network/compute_threads", "-1", "0 (all cores) or more"},
@@ -105,6 +106,49 @@ TEST(BuildConfig, WithoutThresholdsItNamesCalibrate) {
   } catch (const ConfigError& error) {
     EXPECT_NE(std::string(error.what()).find("quadruped3d calibrate"), std::string::npos);
   }
+}
+
+TEST(BuildConfig, DatasetsThatBringTheirLabelsNeedNoNetwork) {
+  json config = good();
+  EXPECT_EQ(parse_build_config(config, "t").datasets[0].role, Role::pseudo);
+  EXPECT_TRUE(needs_network(parse_build_config(config, "t")));
+  config.erase("network");
+  config.erase("filter");
+  EXPECT_THROW(parse_build_config(config, "t"), ConfigError);
+  config["datasets"][0]["role"] = "truth";
+  EXPECT_EQ(parse_build_config(config, "t").datasets[0].role, Role::truth);
+  EXPECT_FALSE(needs_network(parse_build_config(config, "t")));
+  config["datasets"][0]["role"] = "2d_only";
+  EXPECT_EQ(parse_build_config(config, "t").datasets[0].role, Role::two_d_only);
+  config["datasets"].push_back(good()["datasets"][0]);  // one that needs the network is enough
+  config["datasets"][1]["name"] = "b";
+  EXPECT_THROW(parse_build_config(config, "t"), ConfigError);
+  config["network"] = good()["network"];
+  EXPECT_TRUE(needs_network(parse_build_config(config, "t")));
+}
+
+TEST(BuildConfig, TruthIsRefusedWhereTheFormatHasNoBodies) {
+  json config = good();
+  config["datasets"][0]["role"] = "truth";
+  config["datasets"][0]["format"] = "superanimal";
+  try {
+    parse_build_config(config, "t");
+    FAIL();
+  } catch (const ConfigError& error) {
+    EXPECT_NE(std::string(error.what()).find("2d_only"), std::string::npos) << error.what();
+  }
+}
+
+TEST(BuildConfig, TheShippedConfigsOfTheWorldAreSound) {
+  const std::filesystem::path configs = testing::data_dir() / "../../configs";
+  for (const char* pool : {"animal3d", "ctrlani3d", "superanimal"}) {
+    const BuildConfig config = load_build_config({configs / "world_pools" / (std::string(pool) + ".json")});
+    EXPECT_FALSE(needs_network(config)) << pool;
+    EXPECT_EQ(config.datasets[0].root.parent_path(),
+              std::filesystem::weakly_canonical(configs / "../data/world"))
+        << pool;
+  }
+  EXPECT_TRUE(needs_network(load_build_config({configs / "world_stage2.json"})));
 }
 
 TEST(BuildConfig, TwoDatasetsOfOneNameAndSplitAreRefused) {

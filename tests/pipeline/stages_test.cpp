@@ -17,8 +17,12 @@ struct Inputs {
   std::string device = "cpu-2";
 
   Inputs() {
-    config.datasets.push_back(
-        {.name = "a", .format = "prima", .split = "train", .root = "r", .annotations = "t", .images = ""});
+    DatasetConfig& dataset = config.datasets.emplace_back();
+    dataset.name = "a";
+    dataset.format = "prima";
+    dataset.split = "train";
+    dataset.root = "r";
+    dataset.annotations = "t";
     ingest.annotation_digests["a/train"] = "digest";
     ingest.units.push_back({0, 0, 1, "unit"});
     limits.tau_low = 0.1;
@@ -80,6 +84,21 @@ TEST(StageKeys, WhatDecidesRefinementsAndShardsIsInTheirKeys) {
   quality.config.shards.jpeg_quality = 50;
   EXPECT_EQ(before.refine, quality.keys().refine);
   EXPECT_NE(before.shards, quality.keys().shards);
+}
+
+TEST(StageKeys, WithoutPseudoLabelsNothingOfTheNetworkIsInThem) {
+  Inputs inputs;
+  inputs.config.datasets[0].role = Role::truth;
+  const StageKeys before = inputs.keys();
+  EXPECT_NE(before.predict, Inputs().keys().predict);
+  Inputs other = inputs;
+  other.config.network.batch = 3;
+  other.config.tta.learning_rate = 3;
+  other.limits.tau_low = 0.15;
+  EXPECT_EQ(before.shards, other.keys().shards);
+  EXPECT_EQ(before.dataset, other.keys().dataset);
+  other.config.shards.jpeg_quality = 50;
+  EXPECT_NE(before.shards, other.keys().shards);
 }
 
 TEST(StageFolder, RefusesAFolderOfAnotherKey) {
