@@ -41,7 +41,7 @@ int run(int argc, char** argv) {
       {"verify", cli::add_verify(app)},   {"inspect", cli::add_inspect(app)},
       {"sample", cli::add_sample(app)},   {"init", cli::add_init(app)},
       {"train", cli::add_train(app)},     {"evaluate", cli::add_evaluate(app)},
-      {"compare", cli::add_compare(app)},
+      {"compare", cli::add_compare(app)}, {"evaluate-labels", cli::add_evaluate_labels(app)},
   };
   try {
     app.parse(argc, argv);

@@ -57,6 +57,9 @@ EvaluationConfig load_evaluation_config(const std::vector<fs::path>& files, cons
     build["network"]["checkpoint"] = fs::absolute(checkpoint).string();
   }
   const BuildConfig parsed = parse_build_config(build, layers.where);
+  if (parsed.network.checkpoint.empty()) {
+    throw ConfigError(layers.where + ": the key \"network\" is missing: there is no network to evaluate");
+  }
   for (std::size_t i = 0; i < config.datasets.size(); ++i) config.datasets[i].source = parsed.datasets[i];
   config.network = parsed.network;
   config.tta = parsed.tta;

@@ -24,6 +24,19 @@ const std::array<MetricInfo, kMetricCount> kMetrics{{
     {Metric::pa_mpvpe, "pa_mpvpe_mm", "PA-MPVPE", 1, false, true},
 }};
 
+MetricMean mean_of(std::span<const MetricValues* const> samples, std::size_t metric, bool missing_is_zero) {
+  MetricMean result;
+  double sum = 0.0;
+  for (const MetricValues* values : samples) {
+    const std::optional<double>& value = (*values)[metric];
+    if (!value && !missing_is_zero) continue;
+    sum += value.value_or(0.0);
+    ++result.samples;
+  }
+  if (result.samples > 0) result.mean = sum / static_cast<double>(result.samples);
+  return result;
+}
+
 Target make_target(const manifests::SampleRecord& record, double mask_area_px) {
   Target target;
   target.keypoints = crop_keypoints(record);

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "pipeline/body_meshes.h"
@@ -32,6 +33,14 @@ using MetricValues = std::array<std::optional<double>, kMetricCount>;
 inline std::size_t index_of(Metric metric) {
   return static_cast<std::size_t>(metric);
 }
+
+struct MetricMean {
+  std::optional<double> mean;
+  std::int64_t samples = 0;  // behind the mean
+};
+// Of one metric over samples; a sample without a value is left out, or counts as 0.
+MetricMean mean_of(std::span<const MetricValues* const> samples, std::size_t metric,
+                   bool missing_is_zero = false);
 
 // What a prediction is measured against.
 struct Target {

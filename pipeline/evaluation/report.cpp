@@ -4,6 +4,7 @@
 
 #include "manifests/atomic_file.h"
 #include "pipeline/evaluation/csv.h"
+#include "pipeline/evaluation/report_values.h"
 #include "pipeline/evaluation/text_table.h"
 
 namespace q3d::pipeline::evaluation {
@@ -12,22 +13,13 @@ namespace {
 using manifests::Reason;
 using nlohmann::ordered_json;
 
-// Shortest text that reads back as the same number; empty for nothing.
-std::string number(const std::optional<double>& value) {
-  return value ? fmt::format("{}", *value) : std::string();
-}
-
-ordered_json number_or_null(const std::optional<double>& value) {
-  return value ? ordered_json(*value) : ordered_json(nullptr);
-}
-
 ordered_json row_json(const TableRow& row, const char* group) {
   ordered_json object = {{"dataset", row.dataset}};
   if (group != nullptr) object[group] = row.group;
   object["setting"] = row.setting->name;
   object["uses_test_keypoints"] = row.setting->uses_test_keypoints;
   object["samples"] = row.samples;
-  object["normaliser"] = normaliser_name(row);
+  object["normaliser"] = normaliser_name(row.by_mask, row.samples);
   object["normalised_by_mask"] = row.by_mask;
   ordered_json counts = ordered_json::object();
   for (const MetricInfo& info : kMetrics) {
@@ -121,9 +113,9 @@ void add_table_csv(const char* table, const std::vector<TableRow>& rows, std::st
                   row.setting->name,
                   row.setting->uses_test_keypoints ? "1" : "0",
                   std::to_string(row.samples),
-                  normaliser_name(row)};
+                  normaliser_name(row.by_mask, row.samples)};
     for (const MetricMean& metric : row.metrics) {
-      fields.push_back(number(metric.mean));
+      fields.push_back(number_text(metric.mean));
       fields.push_back(std::to_string(metric.samples));
     }
     fields.emplace_back();
@@ -147,8 +139,8 @@ std::string table_text(const std::vector<TableRow>& rows, const char* group) {
     const bool same_group = same_dataset && row.group == last_group;
     std::vector<std::string> cells{same_dataset ? "" : row.dataset};
     if (group != nullptr) cells.push_back(same_group ? "" : row.group);
-    cells.insert(cells.end(),
-                 {shown_setting(*row.setting), normaliser_name(row), std::to_string(row.samples)});
+    cells.insert(cells.end(), {shown_setting(*row.setting), normaliser_name(row.by_mask, row.samples),
+                               std::to_string(row.samples)});
     for (const MetricInfo& info : kMetrics) {
       cells.push_back(cell(row.metrics[index_of(info.metric)].mean, info.decimals));
     }
@@ -229,7 +221,7 @@ std::string samples_csv(const Evaluation& evaluation) {
         CsvRow fields = start;
         fields.insert(fields.end(),
                       {"", evaluation.settings[s].name, sample.normalised_by_mask ? "mask" : "crop"});
-        for (const auto& value : sample.values[s]) fields.push_back(number(value));
+        for (const auto& value : sample.values[s]) fields.push_back(number_text(value));
         text += csv_line(fields);
       }
     }
@@ -253,7 +245,7 @@ std::string tables_csv(const Tables& tables) {
                   row.setting != nullptr && row.setting->uses_test_keypoints ? "1" : "0",
                   std::to_string(row.samples)};
     fields.resize(header.size());
-    fields.back() = number(row.ari);
+    fields.back() = number_text(row.ari);
     text += csv_line(fields);
   }
   return text;

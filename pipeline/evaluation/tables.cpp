@@ -20,24 +20,10 @@ Samples predicted(const DatasetResult& dataset) {
   return samples;
 }
 
-bool has_any(const Samples& samples, std::size_t setting, std::size_t metric) {
-  for (const SampleResult* sample : samples) {
-    if (sample->values[setting][metric]) return true;
-  }
-  return false;
-}
-
-MetricMean mean_of(const Samples& samples, std::size_t setting, std::size_t metric, bool missing_is_zero) {
-  MetricMean result;
-  double sum = 0.0;
-  for (const SampleResult* sample : samples) {
-    const std::optional<double>& value = sample->values[setting][metric];
-    if (!value && !missing_is_zero) continue;
-    sum += value.value_or(0.0);
-    ++result.samples;
-  }
-  if (result.samples > 0) result.mean = sum / static_cast<double>(result.samples);
-  return result;
+std::vector<const MetricValues*> values_of(const Samples& samples, std::size_t setting) {
+  std::vector<const MetricValues*> values;
+  for (const SampleResult* sample : samples) values.push_back(&sample->values[setting]);
+  return values;
 }
 
 class TableMaker {
@@ -82,9 +68,11 @@ class TableMaker {
       row.setting = &evaluation_.settings[s];
       row.samples = static_cast<std::int64_t>(samples.size());
       for (const SampleResult* sample : samples) row.by_mask += sample->normalised_by_mask ? 1 : 0;
+      const auto values = values_of(samples, s);
+      const auto values_of_all = values_of(all, s);
       for (std::size_t m = 0; m < kMetricCount; ++m) {
-        const bool zero = evaluation_.options.official_means && has_any(all, s, m);
-        row.metrics[m] = mean_of(samples, s, m, zero);
+        const bool zero = evaluation_.options.official_means && mean_of(values_of_all, m).samples > 0;
+        row.metrics[m] = mean_of(values, m, zero);
       }
     }
   }
@@ -128,12 +116,6 @@ class TableMaker {
 };
 
 }  // namespace
-
-std::string normaliser_name(const TableRow& row) {
-  if (row.samples == 0) return "";
-  if (row.by_mask == row.samples) return "mask";
-  return row.by_mask == 0 ? "crop" : "mask and crop";
-}
 
 Tables make_tables(const Evaluation& evaluation) {
   return TableMaker(evaluation).make();

@@ -12,11 +12,6 @@
 
 namespace q3d::pipeline::evaluation {
 
-struct MetricMean {
-  std::optional<double> mean;
-  std::int64_t samples = 0;  // behind the mean
-};
-
 // One row of a table: a group of samples of one dataset under one setting.
 struct TableRow {
   std::string dataset;  // name/split
@@ -26,7 +21,6 @@ struct TableRow {
   std::int64_t by_mask = 0;  // of these, normalised by a mask; the others by the whole crop
   std::array<MetricMean, kMetricCount> metrics;
 };
-std::string normaliser_name(const TableRow& row);  // "mask", "crop", "mask and crop"; "" without samples
 
 // Agreement of k-means clusters of shapes with families, over the samples whose family is one of the five.
 struct ClusterRow {
