@@ -145,7 +145,7 @@ TEST(BuildConfig, TheShippedConfigsOfTheWorldAreSound) {
     const BuildConfig config = load_build_config({configs / "world_pools" / (std::string(pool) + ".json")});
     EXPECT_FALSE(needs_network(config)) << pool;
     EXPECT_EQ(config.datasets[0].root.parent_path(),
-              std::filesystem::weakly_canonical(configs / "../data/sample_world"))
+              std::filesystem::weakly_canonical(configs / "../data/world"))
         << pool;
   }
   EXPECT_TRUE(needs_network(load_build_config({configs / "world_stage2.json"})));
