@@ -41,6 +41,7 @@ constexpr std::array kFields{
     Field{"learn_bio_encoder", &PrimaConfig::learn_bio_encoder},
     Field{"betas_from_bio", &PrimaConfig::betas_from_bio},
     Field{"keypoint_tokens", &PrimaConfig::keypoint_tokens},
+    Field{"true_token_grid", &PrimaConfig::true_token_grid},
     Field{"drop_path", &PrimaConfig::drop_path},
     Field{"dropout", &PrimaConfig::dropout},
 };
@@ -98,6 +99,7 @@ PrimaConfig named_config(const std::string& name) {
     config.clip_width = 96, config.clip_layers = 2, config.clip_heads = 3, config.clip_out = 96;
     config.dec_dim = 128, config.dec_layers = 3, config.dec_heads = 4, config.dec_ffn = 384;
     config.drop_path = 0.05;  // four blocks cannot spare half of themselves
+    config.true_token_grid = true;
     return config;
   }
   if (name == "tiny") {
