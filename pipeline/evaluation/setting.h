@@ -25,9 +25,9 @@ struct TtaPass {
 };
 
 struct SettingOptions {
-  int tta_iterations = 0;              // 0 = no adaptation
-  std::vector<int> curve;              // iterates to measure
-  std::vector<double> visible_shares;  // needs tta_iterations
+  int tta_iterations = 0;                // 0 = no adaptation
+  std::vector<int> curve{};              // iterates to measure
+  std::vector<double> visible_shares{};  // needs tta_iterations
 };
 
 struct Plan {
