@@ -92,10 +92,10 @@ class Evaluation(unittest.TestCase):
         shutil.rmtree(cls.root)
 
     @classmethod
-    def write_config(cls, name, **changes):
+    def write_config(cls, file_name, **changes):
         config = {"network": cls.network, "tta": {"learning_rate": 1e-3}, **changes}
-        (cls.root / name).write_text(json.dumps(config))
-        return cls.root / name
+        (cls.root / file_name).write_text(json.dumps(config))
+        return cls.root / file_name
 
     @classmethod
     def predictions(cls):
