@@ -43,7 +43,8 @@ Command add_train(CLI::App& app) {
   command->add_option("-c,--config", arguments->configs, "JSON config; a second one is laid over the first")
       ->required()
       ->check(CLI::ExistingFile);
-  command->add_option("-s,--stage", arguments->stage, "the config's stage to train, such as 1 or 3")->required();
+  command->add_option("-s,--stage", arguments->stage, "the config's stage to train, such as 1 or 3")
+      ->required();
   command->add_option("-o,--out", arguments->options.out, "folder of this run: state, log and weights")
       ->required();
   command

@@ -193,7 +193,7 @@ TEST(OfficialNames, SmallFitsTwelveMegabytesInHalfPrecision) {
   for (const TensorSpec& spec : expected_tensors(named_config("small"))) {
     total += torch::empty(spec.shape, torch::kMeta).numel();
   }
-  EXPECT_GT(total, 1'000'000);  // the sum is not empty
+  EXPECT_GT(total, 1'000'000);                 // the sum is not empty
   EXPECT_LT(2 * total, 12'000'000 - 100'000);  // the header takes some 60 kB
 }
 
