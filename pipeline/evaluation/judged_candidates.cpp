@@ -104,7 +104,7 @@ JudgedPool read_judged_pool(const BuildConfig& config, Workspace& workspace) {
   }
   const Ingest& ingest = workspace.ingest();
   const StageKeys keys =
-      stage_keys(config, thresholds(config), ingest, workspace.assets(), workspace.device_key());
+      stage_keys(config, judging_rules(config), ingest, workspace.assets(), workspace.device_key());
   const fs::path folder = version_folder(workspace.out(), config, keys);
   if (!is_published(folder, keys)) {
     throw std::runtime_error(
