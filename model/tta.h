@@ -9,6 +9,7 @@
 #include <bitset>
 #include <vector>
 
+#include "model/decoder.h"
 #include "model/prima.h"
 
 namespace q3d::model {

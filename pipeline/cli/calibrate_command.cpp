@@ -68,7 +68,8 @@ nlohmann::ordered_json to_json(const CalibrationSummary& summary) {
                                     {"refined_share", result.refined},
                                     {"reached", result.reached},
                                     {"curve", std::move(curve)}};
-    entry["dataset"] = pool.dataset.empty() ? nlohmann::ordered_json(nullptr) : pool.dataset;
+    entry["dataset"] = nullptr;
+    if (!pool.dataset.empty()) entry["dataset"] = pool.dataset;
     pools.push_back(std::move(entry));
   }
   return {{"candidates", summary.candidates}, {"pools", std::move(pools)}};

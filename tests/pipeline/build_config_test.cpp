@@ -180,6 +180,11 @@ TEST(BuildConfig, TheShippedConfigsOfTheWorldAreSound) {
         << pool;
   }
   EXPECT_TRUE(needs_network(load_build_config({configs / "world_stage2.json"})));
+  const BuildConfig strict =
+      load_build_config({configs / "world_stage2.json", configs / "world_strict.json"});
+  EXPECT_EQ(strict.profile, "strict");
+  EXPECT_GT(strict.guards.held_out_share, 0.0);
+  EXPECT_EQ(strict.guards.priors.parent_path(), std::filesystem::weakly_canonical(configs / "../data/loop"));
 }
 
 TEST(BuildConfig, TwoDatasetsOfOneNameAndSplitAreRefused) {
