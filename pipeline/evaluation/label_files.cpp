@@ -4,8 +4,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include <algorithm>
-#include <charconv>
 #include <stdexcept>
 
 #include "manifests/atomic_file.h"
@@ -19,26 +17,10 @@ namespace fs = std::filesystem;
 using manifests::Verdict;
 using nlohmann::json;
 
-std::size_t column(const CsvRow& header, const std::string& name) {
-  const auto found = std::find(header.begin(), header.end(), name);
-  if (found == header.end()) throw std::invalid_argument("the column \"" + name + "\" is missing");
-  return static_cast<std::size_t>(found - header.begin());
-}
-
-std::optional<double> parse_number(const std::string& text) {
-  if (text.empty()) return std::nullopt;
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size()) {
-    throw std::invalid_argument("got \"" + text + "\", expected a number or nothing");
-  }
-  return value;
-}
-
 std::vector<StoredLabel> read_candidates(const std::vector<CsvRow>& rows) {
   if (rows.empty()) throw std::invalid_argument("the file is empty");
-  const std::size_t id = column(rows[0], "id");
-  const std::size_t verdict = column(rows[0], "verdict");
+  const std::size_t id = column_of(rows[0], "id");
+  const std::size_t verdict = column_of(rows[0], "verdict");
   std::vector<StoredLabel> labels;
   for (std::size_t r = 1; r < rows.size(); ++r) {
     StoredLabel& label = labels.emplace_back();
@@ -47,7 +29,7 @@ std::vector<StoredLabel> read_candidates(const std::vector<CsvRow>& rows) {
     label.kept = judged == Verdict::retained || judged == Verdict::refined;
     for (const MetricInfo& info : kMetrics) {
       label.values[index_of(info.metric)] =
-          parse_number(rows[r][column(rows[0], fmt::format("label_{}", info.key))]);
+          number_of(rows[r][column_of(rows[0], fmt::format("label_{}", info.key))]);
     }
   }
   return labels;
