@@ -51,8 +51,8 @@ struct TrainingConfig {
   model::LossWeights loss_weights;
   model::LossVariant loss_variant = model::LossVariant::sound;
   double weight_decay = 1e-4;
-  double largest_gradient_norm = 0.0;  // 0 = no clipping
-  double divergence_factor = 20.0;     // a loss above this times its running mean stops the run
+  double largest_gradient_norm = 0.0;   // 0 = no clipping
+  double divergence_factor = 20.0;      // a loss above this times its running mean stops the run
   std::string model_dtype = "float32";  // of the finished weights' file; or float16
   std::uint64_t seed = 0;
   std::int64_t checkpoint_every = 500;  // steps
