@@ -4,11 +4,19 @@ BUILD  := build/$(PRESET)
 OUT    ?= out
 CONFIG ?=
 JOBS   ?= $(shell nproc)
+SCHEDULE ?= full
+SEED     ?= 0
 
-.PHONY: quadruped3d test program build setup assets format bench asan clean help
+.PHONY: quadruped3d sample-model sample-loop test program build setup assets format bench asan clean help
 
 quadruped3d: program  ## build the dataset that CONFIG describes (default: the rendered sample world)
 	tools/quadruped3d.sh $(OUT) $(CONFIG)
+
+sample-model: program  ## train the default network on the rendered world (pre-training and Stage 1)
+	tools/sample_loop.sh model
+
+sample-loop: program  ## Stage 1, Stage 2, Stage 3 and their tables (SCHEDULE=full or quick, SEED=0)
+	tools/sample_loop.sh loop $(SCHEDULE) $(SEED)
 
 test: build  ## build everything and run all tests
 	ctest --test-dir $(BUILD) --output-on-failure
@@ -44,4 +52,4 @@ clean:  ## remove what was compiled
 	rm -rf build
 
 help:  ## this list
-	@grep -hE '^[a-z0-9]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 16
+	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 16

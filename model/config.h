@@ -32,6 +32,9 @@ struct PrimaConfig {
       false;                    // true: without F_bio, an encoder trained from random weights takes its place
   bool betas_from_bio = true;   // false: without beta_init, the betas start from zero
   bool keypoint_tokens = true;  // false: without T_keypoint, no keypoint token nor auxiliary keypoint
+  // false: the decoder reads the image tokens as the released weights need it, 12 rows of 16; true: as they
+  // lie, 16 rows of 12, so that positions and sampling mean what they say. For weights trained from scratch.
+  bool true_token_grid = false;
   // training only
   double drop_path = 0.55;  // of the last ViT block; rises linearly from 0 at the first
   double dropout = 0.1;     // in the decoder layers, attention included

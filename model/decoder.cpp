@@ -5,10 +5,20 @@ namespace {
 
 constexpr double kNormEpsilon = 1e-5;
 
-// The official decoder reads its image tokens as 12 rows of 16 although the ViT lays them out as 16 rows of
-// 12. The released weights were trained so, hence positions and sampling must keep it.
-constexpr std::int64_t kRows = 12;
-constexpr std::int64_t kColumns = 16;
+// How the decoder lays out the 192 image tokens.
+struct TokenGrid {
+  std::int64_t rows, columns;
+  double x_scale;  // from crop units to the width that the columns cover
+};
+
+// The official decoder reads its image tokens as 12 rows of 16 over the whole crop, although the ViT lays
+// them out as 16 rows of 12 over the crop's middle three quarters. The released weights were trained so.
+constexpr TokenGrid kOfficialGrid{12, 16, 1.0};
+constexpr TokenGrid kTrueGrid{16, 12, 4.0 / 3.0};
+
+const TokenGrid& grid_of(bool true_token_grid) {
+  return true_token_grid ? kTrueGrid : kOfficialGrid;
+}
 
 // Sine and cosine of one axis: position (N) in [0, 1) -> (N, half).
 torch::Tensor encode_axis(const torch::Tensor& position, std::int64_t half) {
@@ -20,10 +30,10 @@ torch::Tensor encode_axis(const torch::Tensor& position, std::int64_t half) {
 }
 
 // (192, width) = [y | x]. Official code: PositionalEncoding2D.
-torch::Tensor position_encoding(std::int64_t width) {
-  const torch::Tensor index = torch::arange(kRows * kColumns);
-  const torch::Tensor y = torch::floor_divide(index, kColumns).to(torch::kFloat32) / kRows;
-  const torch::Tensor x = torch::remainder(index, kColumns).to(torch::kFloat32) / kColumns;
+torch::Tensor position_encoding(std::int64_t width, const TokenGrid& grid) {
+  const torch::Tensor index = torch::arange(grid.rows * grid.columns);
+  const torch::Tensor y = torch::floor_divide(index, grid.columns).to(torch::kFloat32) / grid.rows;
+  const torch::Tensor x = torch::remainder(index, grid.columns).to(torch::kFloat32) / grid.columns;
   return torch::cat({encode_axis(y, width / 2), encode_axis(x, width / 2)}, 1);
 }
 
@@ -38,9 +48,9 @@ torch::Tensor hat_weights(const torch::Tensor& coordinate, std::int64_t count) {
 
 // Bilinear samples at xy (B, N, 2) of the grid of tokens source (B, 192, D) -> (B, N, D): F.grid_sample with
 // align_corners = False and zero padding, as one matrix product, which is deterministic on every device.
-torch::Tensor sample_grid(const torch::Tensor& source, const torch::Tensor& xy) {
-  const torch::Tensor across = hat_weights(xy.select(2, 0), kColumns).unsqueeze(2);
-  const torch::Tensor down = hat_weights(xy.select(2, 1), kRows).unsqueeze(3);
+torch::Tensor sample_grid(const torch::Tensor& source, const torch::Tensor& xy, const TokenGrid& grid) {
+  const torch::Tensor across = hat_weights(xy.select(2, 0) * grid.x_scale, grid.columns).unsqueeze(2);
+  const torch::Tensor down = hat_weights(xy.select(2, 1), grid.rows).unsqueeze(3);
   return torch::bmm((down * across).flatten(2).to(source.scalar_type()), source);
 }
 
@@ -106,7 +116,8 @@ struct Decoder::KeypointUpdate {
 Decoder::Decoder(const PrimaConfig& config, const Placement& placement)
     : rounds_(config.ief_iterations),
       betas_from_bio_(config.betas_from_bio),
-      has_keypoint_tokens_(config.keypoint_tokens) {
+      has_keypoint_tokens_(config.keypoint_tokens),
+      true_token_grid_(config.true_token_grid) {
   const std::int64_t width = config.dec_dim;
   const Placement exact = placement.unreduced();
   const auto embedding = [&](const std::string& name) {
@@ -137,7 +148,7 @@ Decoder::Decoder(const PrimaConfig& config, const Placement& placement)
   if (config.embed_dim != width) {
     image_proj_ = register_module("image_proj", std::make_shared<Linear>(config.embed_dim, width, placement));
   }
-  position_ = position_encoding(width).to(placement.vector());
+  position_ = position_encoding(width, grid_of(true_token_grid_)).to(placement.vector());
   const auto layers = register_module("layers", std::make_shared<torch::nn::Module>());
   for (std::int64_t i = 0; i < config.dec_layers; ++i) {
     layers_.push_back(
@@ -184,7 +195,8 @@ Decoder::KeypointUpdate Decoder::update_keypoints(const torch::Tensor& tokens,
   KeypointUpdate update;
   update.keypoints_2d = torch::tanh(kp2d_from_tokens_->forward(tokens.narrow(1, 1, kKeypoints))) * 0.5;
   update.augment_2d = keypoint_2d_pos_encoder_->forward(update.keypoints_2d);
-  update.features_2d = sample_grid(sampled_source, update.keypoints_2d) + keypoint_2d_feat_linear_->bias;
+  update.features_2d = sample_grid(sampled_source, update.keypoints_2d, grid_of(true_token_grid_)) +
+                       keypoint_2d_feat_linear_->bias;
   update.keypoints_3d = kp3d_from_tokens_->forward(tokens.narrow(1, 1 + kKeypoints, kKeypoints));
   // The position encoder sees the keypoints relative to the mean of the first two (the eyes).
   const torch::Tensor centre = update.keypoints_3d.narrow(1, 0, 2).mean(1, /*keepdim=*/true);

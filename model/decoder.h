@@ -71,6 +71,7 @@ class Decoder : public torch::nn::Module {
   std::int64_t rounds_;
   bool betas_from_bio_;
   bool has_keypoint_tokens_;
+  bool true_token_grid_;
   torch::Tensor init_pose_;  // (1, 210)
   torch::Tensor init_cam_;   // (1, 3)
   torch::Tensor position_;   // (192, D), not a parameter

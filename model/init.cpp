@@ -37,7 +37,7 @@ bool is_embedding(std::string_view name) {
 
 bool is_last_of_head(std::string_view name) {
   return ends_with(name, "decpose.2.weight") || ends_with(name, "decshape.2.weight") ||
-         ends_with(name, "deccam.2.weight");
+         ends_with(name, "deccam.2.weight") || ends_with(name, "bio_to_betas_init.2.weight");
 }
 
 // The spread of a tensor that is neither constant nor a layer norm. Embeddings have the official standard
@@ -79,8 +79,13 @@ torch::Tensor grid_positions(std::int64_t rows, std::int64_t columns, std::int64
 }  // namespace
 
 torch::Tensor initial_tensor(const TensorSpec& spec, std::uint64_t seed) {
-  if (ends_with(spec.name, "init_pose")) {  // the identity, 35 times: columns (1, 0, 0) and (0, 1, 0)
-    return torch::tensor({1.0F, 0.0F, 0.0F, 0.0F, 1.0F, 0.0F}).repeat({1, kPose6d / 6});
+  if (ends_with(spec.name, "init_pose")) {
+    // The identity in 6D, columns (1, 0, 0) and (0, 1, 0), for all joints but the root. The body's y points
+    // up and the camera's down, so a body at the identity hangs upside down, and no gradient turns it: half
+    // way its 6D column vanishes, and training bends the spine over instead.
+    torch::Tensor pose = torch::tensor({1.0F, 0.0F, 0.0F, 0.0F, 1.0F, 0.0F}).repeat({1, kPose6d / 6});
+    pose[0][4] = -1.0F;
+    return pose;
   }
   if (ends_with(spec.name, "init_cam")) return torch::tensor({{0.9F, 0.0F, 0.0F}});
   if (ends_with(spec.name, "backbone.pos_embed")) {

@@ -7,12 +7,6 @@
 #include "model/net.h"
 
 namespace q3d::model {
-namespace {
-
-constexpr double kBackboneRateScale = 0.1;
-
-}  // namespace
-
 AdamW::AdamW(std::vector<ParameterGroup> groups, const AdamWOptions& options) : options_(options) {
   for (ParameterGroup& group : groups) {
     Group& kept = groups_.emplace_back();
@@ -104,8 +98,8 @@ void AdamW::restore_state(const smal::SafeTensors& file, const std::string& pref
   }
 }
 
-std::vector<ParameterGroup> parameter_groups(PrimaNet& net) {
-  ParameterGroup backbone{{}, kBackboneRateScale};
+std::vector<ParameterGroup> parameter_groups(PrimaNet& net, double backbone_rate_scale) {
+  ParameterGroup backbone{{}, backbone_rate_scale};
   ParameterGroup others{{}, 1.0};
   for (auto& parameter : net.named_parameters()) {
     const std::string_view name = parameter.key();

@@ -68,7 +68,8 @@ class AdamW {
 // Official code: PRIMA.get_parameters and configure_optimizers. The backbone learns at a tenth of the rate;
 // the decoder and BioCLIP's projection at the full rate. BioCLIP's encoder is in no group, and its gradients
 // are switched off, unless the network trains it instead of keeping it frozen.
-std::vector<ParameterGroup> parameter_groups(PrimaNet& net);
+inline constexpr double kBackboneRateScale = 0.1;
+std::vector<ParameterGroup> parameter_groups(PrimaNet& net, double backbone_rate_scale = kBackboneRateScale);
 
 // The learning rate over a run. Paper: linear decay; official code: none.
 struct RateSchedule {

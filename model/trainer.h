@@ -22,6 +22,7 @@ struct TrainerOptions {
   LossWeights weights;
   LossVariant variant = LossVariant::sound;
   AdamWOptions adamw;
+  double backbone_rate_scale = kBackboneRateScale;  // of the schedule's rate
   RateSchedule schedule;
   double largest_gradient_norm = 0.0;  // longer gradients are scaled down to it; 0 = never
   Precision precision = Precision::float32;

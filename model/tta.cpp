@@ -76,6 +76,9 @@ void check_arguments(const Prima& prima, const ImageFeatures& features, const to
   }
   require(std::isfinite(options.learning_rate) && options.learning_rate >= 0.0,
           fmt::format("learning rate {}", options.learning_rate));
+  require(std::is_sorted(options.snapshots.begin(), options.snapshots.end()) &&
+              (options.snapshots.empty() || options.snapshots.front() >= 0),
+          "snapshots must be ascending and 0 or more");
 }
 
 // (L0 - min over iterates 1..n) / L0.
@@ -119,6 +122,10 @@ class Adaptation {
     while (slots_.size() > 0) advance();
     result_.best = assemble(prima_.net(), prima_.body(), unpack(best_), initial_betas_, false);
     result_.last = assemble(prima_.net(), prima_.body(), unpack(last_), initial_betas_, false);
+    while (snapshots_.size() < options_.snapshots.size()) snapshots_.push_back(last_);
+    for (const torch::Tensor& rows : snapshots_) {
+      result_.snapshots.push_back(assemble(prima_.net(), prima_.body(), unpack(rows), initial_betas_, false));
+    }
     return std::move(result_);
   }
 
@@ -131,6 +138,9 @@ class Adaptation {
     const auto leaves = slots_.parameters(may_step);
     const Iterate iterate = evaluate(leaves, may_step);
     const std::vector<bool> goes_on = record(iterate);
+    while (snapshots_.size() < options_.snapshots.size() && options_.snapshots[snapshots_.size()] == taken_) {
+      snapshots_.push_back(last_.clone());
+    }
     ++taken_;
     if (std::find(goes_on.begin(), goes_on.end(), true) != goes_on.end()) {
       // The gradient of the sum of losses: no operation mixes instances, so each one's stays its own.
@@ -223,7 +233,8 @@ class Adaptation {
   const TtaOptions& options_;
   torch::Tensor initial_betas_;  // (B, 41)
   TtaSlots slots_;
-  torch::Tensor best_, last_;  // (B, 384) packed outputs
+  torch::Tensor best_, last_;             // (B, 384) packed outputs
+  std::vector<torch::Tensor> snapshots_;  // likewise, of options_.snapshots so far
   TtaResult result_;
   int taken_ = 0;
 };

@@ -22,6 +22,7 @@ struct TtaOptions {
   double learning_rate = 1e-6;
   double aux_weight = 5.0;
   double reproj_weight = 0.5;
+  std::vector<int> snapshots;  // iterates to keep beside the best and the last; ascending
 };
 
 // When one instance stops. All fields are per instance, so that its result does not depend on its batch mates
@@ -37,6 +38,8 @@ struct TtaSchedule {
 struct TtaResult {
   Prediction best;  // the iterate of least L_proj, iteration 0 included
   Prediction last;  // the iterate after the last step taken
+  // One for each of options.snapshots; an instance that stopped before shows its last iterate.
+  std::vector<Prediction> snapshots;
   // An instance's curves are empty where nothing could be measured: no visible keypoint, or a target or a
   // first prediction that is not finite.
   std::vector<std::vector<double>> l_proj;  // per instance: L_proj of iterates 0..n in crop units

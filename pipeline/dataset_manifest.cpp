@@ -108,7 +108,7 @@ ordered_json count_labels(const Ingest& ingest, const std::vector<manifests::Jud
   return labels;
 }
 
-// null where no dataset needed them.
+// Null where no dataset needed them.
 ordered_json describe_thresholds(const DatasetInputs& inputs) {
   if (!needs_network(*inputs.config)) return nullptr;
   return {{"tau_low", inputs.thresholds->tau_low},

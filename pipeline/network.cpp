@@ -150,8 +150,11 @@ std::vector<BodyPrediction> Network::predict(std::span<const PatchView> patches)
   return rows;
 }
 
-std::vector<AdaptOutcome> Network::adapt(std::span<const AdaptRequest> requests) {
+std::vector<AdaptOutcome> Network::adapt(std::span<const AdaptRequest> requests,
+                                         const std::vector<int>& snapshots) {
   impl_->begin();
+  model::TtaOptions options = impl_->options;
+  options.snapshots = snapshots;
   std::vector<AdaptOutcome> outcomes;
   outcomes.reserve(requests.size());
   for (std::size_t first = 0; first < requests.size(); first += impl_->adapt_batch) {
@@ -171,11 +174,18 @@ std::vector<AdaptOutcome> Network::adapt(std::span<const AdaptRequest> requests)
       const torch::NoGradGuard no_gradients;
       return prima.encode(prima.normalise(stack_patches(patches)));
     }();
-    const model::TtaResult result = model::adapt(prima, features, keypoints, schedules, impl_->options);
+    const model::TtaResult result = model::adapt(prima, features, keypoints, schedules, options);
     std::vector<BodyPrediction> rows;
     append_rows(result.best, rows);
     for (std::size_t i = 0; i < rows.size(); ++i) {
-      outcomes.push_back({rows[i], result.l_proj[i], result.best_iteration[i]});
+      outcomes.push_back({rows[i], result.l_proj[i], result.best_iteration[i], {}});
+    }
+    for (const model::Prediction& snapshot : result.snapshots) {
+      std::vector<BodyPrediction> iterates;
+      append_rows(snapshot, iterates);
+      for (std::size_t i = 0; i < iterates.size(); ++i) {
+        outcomes[first + i].snapshots.push_back(iterates[i]);
+      }
     }
   }
   return outcomes;

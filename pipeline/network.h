@@ -44,6 +44,7 @@ struct AdaptOutcome {
   BodyPrediction best;
   std::vector<double> curve;  // L_proj of iterates 0..n, crop units
   int best_iteration = 0;
+  std::vector<BodyPrediction> snapshots;  // of the iterates that were asked for
 };
 
 // Loads checkpoint and SMAL asset; one caller at a time. Batches are formed from consecutive elements of the
@@ -57,7 +58,10 @@ class Network {
   Network& operator=(const Network&) = delete;
 
   std::vector<BodyPrediction> predict(std::span<const PatchView> patches);
-  std::vector<AdaptOutcome> adapt(std::span<const AdaptRequest> requests);
+  // `snapshots`: iterates to keep beside the best one, ascending; an instance that stopped before shows its
+  // last iterate.
+  std::vector<AdaptOutcome> adapt(std::span<const AdaptRequest> requests,
+                                  const std::vector<int>& snapshots = {});
 
   // "cpu (2 threads)", "cuda:0 NVIDIA H100 80GB HBM3": for people.
   const std::string& device_description() const;

@@ -29,6 +29,7 @@ void link_or_copy(const fs::path& from, const fs::path& to) {
 
 std::vector<ShardEntry> link_shards(const fs::path& folder, const Ingest& ingest, const StageStore& shards) {
   fs::create_directories(folder / "shards");
+  manifests::remove_temporaries(folder);  // what a build that was killed while it published left
   manifests::remove_temporaries(folder / "shards");
   std::vector<ShardEntry> entries;
   for (const Unit& unit : ingest.units) {

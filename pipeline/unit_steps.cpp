@@ -117,8 +117,12 @@ DecodedSample decode_sample(const manifests::SampleRecord& record, Wanted want, 
   }
   const loaders::SquareBox square = loaders::square_box(record.box);
   if (want.patch) {
-    const cv::Mat patch = loaders::make_patch(image.rgb, cv::Mat(), square).rgb;
-    sample.patch.assign(patch.datastart, patch.dataend);
+    const bool warps_mask = want.mask_area && has_mask;
+    const loaders::Patch patch =
+        loaders::make_patch(image.rgb, warps_mask ? mask.silhouette : cv::Mat(), square);
+    sample.patch.assign(patch.rgb.datastart, patch.rgb.dataend);
+    // Official evaluator: the sum of the warped mask / 255, soft edges included.
+    if (patch.has_mask) sample.mask_area_px = cv::sum(patch.mask)[0] / 255.0;
   }
   if (want.stored_crop) store_crop(sample, image.rgb, has_mask ? mask.silhouette : cv::Mat(), square, shards);
   sample.decoded = true;

@@ -18,6 +18,7 @@ CropKeypoints crop_keypoints(const manifests::SampleRecord& record);
 struct Wanted {
   bool patch = false;
   bool stored_crop = false;
+  bool mask_area = false;  // of the patch; comes with it
 };
 
 // One candidate's picture: decoded, checked, cropped. A bad picture is a failure in the result.

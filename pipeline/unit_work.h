@@ -38,6 +38,7 @@ struct DecodedSample {
   int image_height_px = 0;
   bool has_mask = false;
   std::vector<std::uint8_t> patch;     // 256 x 256 x 3 RGB: the network's crop
+  double mask_area_px = 0.0;           // of the patch, when asked for; 0 = no silhouette in it
   std::vector<std::byte> stored_crop;  // encoded; empty when not asked for
   std::vector<std::byte> stored_mask;
   int stored_side_px = 0;

@@ -82,7 +82,7 @@ Command add_build(CLI::App& app) {
       "Examples:\n"
       "  quadruped3d build --config configs/sample.json --config out/thresholds.json --out out\n"
       "  quadruped3d build -c my.json -o out --json > summary.json\n"
-      "  quadruped3d build -c configs/world_pools/animal3d.json -o pools/animal3d\n"
+      "  quadruped3d build -c configs/world_pools/animal3d.json -o out/pools/animal3d\n"
       "A build that was killed goes on where it left off when the same command is run again, and ends with "
       "the same\n"
       "bytes. Bad pictures and records never stop it: they are counted, with reasons, in verdicts.csv.\n"

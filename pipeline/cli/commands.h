@@ -20,5 +20,8 @@ Command add_inspect(CLI::App& app);
 Command add_init(CLI::App& app);
 Command add_sample(CLI::App& app);
 Command add_train(CLI::App& app);
+Command add_evaluate(CLI::App& app);
+Command add_evaluate_labels(CLI::App& app);
+Command add_compare(CLI::App& app);
 
 }  // namespace q3d::pipeline::cli

@@ -43,7 +43,8 @@ Command add_train(CLI::App& app) {
   command->add_option("-c,--config", arguments->configs, "JSON config; a second one is laid over the first")
       ->required()
       ->check(CLI::ExistingFile);
-  command->add_option("-s,--stage", arguments->stage, "the config's stage to train: 1 or 3")->required();
+  command->add_option("-s,--stage", arguments->stage, "the config's stage to train, such as 1 or 3")
+      ->required();
   command->add_option("-o,--out", arguments->options.out, "folder of this run: state, log and weights")
       ->required();
   command
@@ -57,7 +58,7 @@ Command add_train(CLI::App& app) {
   command->add_flag("-q,--quiet", arguments->options.quiet, "no progress");
   command->footer(
       "Examples:\n"
-      "  quadruped3d train --config configs/train_sample.json --stage 1 --out out/stage1\n"
+      "  quadruped3d train --config configs/world_training.json --stage 1 --out out/stage1\n"
       "  quadruped3d train -c my.json --stage 3 -o out/stage3 --max-steps 1000\n"
       "  torchrun --no-python --nproc-per-node 4 quadruped3d train -c my.json --stage 1 -o out/stage1\n"
       "A run that was stopped goes on from its newest state when the same command is run again, with the "

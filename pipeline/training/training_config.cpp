@@ -171,6 +171,7 @@ void parse_optimisation(JsonFields& fields, const std::string& where, TrainingCo
     parse_loss_weights(*weights, where + ": loss_weights", config.loss_weights);
   }
   fields.read("loss_variant", variant);
+  fields.read("backbone_rate", config.backbone_rate);
   fields.read("weight_decay", config.weight_decay);
   fields.read("largest_gradient_norm", config.largest_gradient_norm);
   fields.read("divergence_factor", config.divergence_factor);
@@ -180,6 +181,7 @@ void parse_optimisation(JsonFields& fields, const std::string& where, TrainingCo
   fields.read("log_every", log_every);
   require_one_of(variant, {"sound", "official"}, where + ": loss_variant");
   require_one_of(config.model_dtype, {"float32", "float16"}, where + ": model_dtype");
+  require(config.backbone_rate >= 0.0, where, "\"backbone_rate\" must be 0 or more");
   require(config.weight_decay >= 0.0, where, "\"weight_decay\" must be 0 or more");
   require(config.largest_gradient_norm >= 0.0, where,
           "\"largest_gradient_norm\" must be 0 (no clipping) or more");

@@ -50,6 +50,7 @@ struct TrainingConfig {
   int feed_ahead = 2;  // batches prepared in the background
   model::LossWeights loss_weights;
   model::LossVariant loss_variant = model::LossVariant::sound;
+  double backbone_rate = 0.1;  // of the learning rate, in phases with the objective "prima"
   double weight_decay = 1e-4;
   double largest_gradient_norm = 0.0;   // 0 = no clipping
   double divergence_factor = 20.0;      // a loss above this times its running mean stops the run

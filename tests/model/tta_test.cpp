@@ -89,6 +89,26 @@ TEST_F(Tta, KeepsTheBestIterate) {
   }
 }
 
+// A snapshot is what a run of that length ends with; beyond the run it is the last iterate.
+TEST_F(Tta, SnapshotsAreTheIteratesAskedFor) {
+  TtaOptions options = fast();
+  options.snapshots = {0, 3, 6, 9};
+  const TtaResult result =
+      adapt(samples_->prima, samples_->features, samples_->keypoints, all(steps(6)), options);
+  ASSERT_EQ(result.snapshots.size(), 4U);
+  const std::vector<int> lengths{0, 3, 6, 6};
+  for (std::size_t i = 0; i < lengths.size(); ++i) {
+    const TtaResult shorter = run(samples_->keypoints, all(steps(lengths[i])));
+    expect_near(result.snapshots[i].rotations, shorter.last.rotations, kBatchNoise);
+    expect_near(result.snapshots[i].keypoints_2d, shorter.last.keypoints_2d, kBatchNoise);
+  }
+  EXPECT_GT((result.snapshots[1].rotations - result.snapshots[2].rotations).abs().max().item<double>(),
+            10 * kBatchNoise);
+  options.snapshots = {3, 0};
+  EXPECT_THROW(adapt(samples_->prima, samples_->features, samples_->keypoints, all(steps(6)), options),
+               std::invalid_argument);
+}
+
 // Four lengths in one batch, so slots are emptied and refilled; each as if it had run alone.
 TEST_F(Tta, InstancesDoNotFeelTheirBatchMates) {
   const std::vector<TtaSchedule> schedules{steps(3), steps(12), steps(0), steps(7)};

@@ -207,7 +207,7 @@ class Roles(unittest.TestCase):
 
     def test_verify_finds_a_forged_label(self):
         run("verify", self.dataset)
-        for column, message in (("pose", "truth_"), ("projected_2d", "projected body"), ("has_pose", "has_pose 0")):
+        for column, message in (("pose", "truth_"), ("projected_2d", "projected body"), ("has_pose", "has_pose false")):
             copy = self.root / "forged"
             shutil.copytree(self.dataset, copy)
             shard = copy / "shards/000001.h5"

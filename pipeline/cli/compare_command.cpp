@@ -1,0 +1,83 @@
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <memory>
+#include <stdexcept>
+
+#include "manifests/atomic_file.h"
+#include "pipeline/cli/commands.h"
+#include "pipeline/errors.h"
+#include "pipeline/evaluation/compare.h"
+
+namespace q3d::pipeline::cli {
+namespace {
+
+struct Arguments {
+  std::vector<std::filesystem::path> before;
+  std::vector<std::filesystem::path> after;
+  evaluation::CompareOptions options;
+  std::filesystem::path out;
+  bool json = false;
+};
+
+std::vector<evaluation::StoredEvaluation> read_all(const std::vector<std::filesystem::path>& paths) {
+  std::vector<evaluation::StoredEvaluation> evaluations;
+  for (const auto& path : paths) evaluations.push_back(evaluation::read_evaluation(path));
+  return evaluations;
+}
+
+int run(const Arguments& arguments) {
+  const auto before = read_all(arguments.before);
+  const auto after = read_all(arguments.after);
+  evaluation::Comparison comparison;
+  try {
+    comparison = evaluation::compare(before, after, arguments.options);
+  } catch (const std::invalid_argument& error) {
+    throw ConfigError(std::string("compare: ") + error.what());
+  }
+  const nlohmann::ordered_json document = evaluation::to_json(comparison, before, after);
+  if (!arguments.out.empty()) manifests::write_file_atomically(arguments.out, document.dump(2) + "\n");
+  std::FILE* const people = arguments.json ? stderr : stdout;
+  fmt::print(people, "{}", evaluation::summary_text(comparison));
+  fmt::print(people, "{} resamples over pictures{}; better or worse where the interval leaves out 0\n",
+             arguments.options.bootstrap.resamples,
+             comparison.pairs > 1 ? fmt::format(" and {} pairs of runs", comparison.pairs) : "");
+  if (!arguments.out.empty()) fmt::print(people, "wrote {}\n", arguments.out.string());
+  if (arguments.json) fmt::print("{}\n", document.dump());
+  return 0;
+}
+
+}  // namespace
+
+Command add_compare(CLI::App& app) {
+  auto arguments = std::make_shared<Arguments>();
+  evaluation::CompareOptions& options = arguments->options;
+  CLI::App* command =
+      app.add_subcommand("compare", "is one network better than another on the same pictures?");
+  command->add_option("--before", arguments->before, "folders that `evaluate` wrote, one a seed")
+      ->required()
+      ->check(CLI::ExistingPath);
+  command->add_option("--after", arguments->after, "as many folders, in the order of their partners")
+      ->required()
+      ->check(CLI::ExistingPath);
+  command->add_option("--before-setting", options.before_setting,
+                      "e.g. \"prediction\"; needs --after-setting");
+  command->add_option("--after-setting", options.after_setting, "e.g. \"TTA 30\"");
+  command->add_option("--resamples", options.bootstrap.resamples, "of the bootstrap")
+      ->capture_default_str()
+      ->check(CLI::PositiveNumber);
+  command->add_option("--seed", options.bootstrap.seed, "of the bootstrap")->capture_default_str();
+  command->add_option("-o,--out", arguments->out, "write the comparison as JSON");
+  command->add_flag("--json", arguments->json, "print the comparison as JSON on stdout");
+  command->footer(
+      "Examples:\n"
+      "  quadruped3d compare --before out/stage1/evaluation --after out/stage3/evaluation\n"
+      "  quadruped3d compare --before s1_a s1_b s1_c --after s3_a s3_b s3_c --out comparison.json   three "
+      "seeds\n"
+      "  quadruped3d compare --before eval --after eval --before-setting prediction --after-setting 'TTA "
+      "30'\n"
+      "Samples are paired by id; a paired bootstrap gives the 95 % interval of the mean difference.");
+  return [arguments] { return run(*arguments); };
+}
+
+}  // namespace q3d::pipeline::cli

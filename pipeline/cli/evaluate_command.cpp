@@ -1,0 +1,98 @@
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include <cstdio>
+#include <memory>
+
+#include "pipeline/cli/commands.h"
+#include "pipeline/evaluation/report.h"
+#include "pipeline/progress.h"
+
+namespace q3d::pipeline::cli {
+namespace {
+
+struct Arguments {
+  std::vector<std::filesystem::path> configs;
+  std::filesystem::path checkpoint;
+  std::filesystem::path out;
+  evaluation::EvaluationOptions options;
+  bool species = false;
+  bool json = false;
+};
+
+int run(const Arguments& arguments) {
+  const auto config = evaluation::load_evaluation_config(arguments.configs, arguments.checkpoint);
+  const evaluation::Evaluation result = evaluation::evaluate(config, arguments.options);
+  const evaluation::Tables tables = evaluation::make_tables(result);
+  evaluation::write_evaluation(arguments.out, result, tables);
+  if (!result.device_warning.empty()) fmt::print(stderr, "warning: {}\n", result.device_warning);
+  for (const auto& dataset : result.datasets) {
+    for (const std::string& note : dataset.notes) fmt::print(stderr, "note: {}: {}\n", dataset.name, note);
+  }
+  std::FILE* const people = arguments.json ? stderr : stdout;
+  fmt::print(people, "\n{} (sha256 {}...) on {}, in {}\n\n{}", result.checkpoint,
+             result.checkpoint_sha256.substr(0, 12), result.device, human_duration(result.seconds),
+             evaluation::summary_text(result, tables, arguments.species));
+  fmt::print(people, "every sample: {}\nnext: quadruped3d compare --before {} --after <another evaluation>\n",
+             (arguments.out / "samples.csv").string(), arguments.out.string());
+  if (arguments.json) fmt::print("{}\n", evaluation::to_json(result, tables).dump());
+  return 0;
+}
+
+void add_settings(CLI::App& command, evaluation::EvaluationOptions& options) {
+  command
+      .add_option("--tta", options.settings.tta_iterations,
+                  "measure after so many adaptation steps too (at the config's tta.learning_rate)")
+      ->check(CLI::NonNegativeNumber);
+  command
+      .add_option("--tta-curve", options.settings.curve,
+                  "measure these iterates of adaptation, as they are, e.g. 0,10,20,30,40,50,60,70")
+      ->delimiter(',');
+  command
+      .add_option("--visible", options.settings.visible_shares,
+                  "give --tta only these shares of the visible keypoints, too; metrics use all")
+      ->delimiter(',');
+  command.add_option("--limit", options.limit, "so many samples of each dataset, evenly spaced (0 = all)")
+      ->check(CLI::NonNegativeNumber);
+  command.add_option("--seed", options.seed, "of k-means and of the keypoints hidden by --visible")
+      ->capture_default_str();
+  command.add_flag(
+      "--official-means", options.official_means,
+      "count samples without a visible keypoint, or without truth, as 0, as the official code does");
+}
+
+}  // namespace
+
+Command add_evaluate(CLI::App& app) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = app.add_subcommand("evaluate", "the paper's metrics of a network on test sets");
+  command->add_option("-c,--config", arguments->configs, "JSON config; a second one is laid over the first")
+      ->required()
+      ->check(CLI::ExistingFile);
+  command
+      ->add_option("--checkpoint", arguments->checkpoint,
+                   "takes the place of the config's network.checkpoint")
+      ->check(CLI::ExistingFile);
+  command->add_option("-o,--out", arguments->out, "folder for evaluation.json, samples.csv and tables.csv")
+      ->required();
+  add_settings(*command, arguments->options);
+  command->add_flag("--species", arguments->species, "show the table of species, too");
+  command
+      ->add_option("-t,--threads", arguments->options.threads, "threads that read and decode (0 = all cores)")
+      ->check(CLI::NonNegativeNumber);
+  command->add_flag("--json", arguments->json, "print evaluation.json on stdout");
+  command->add_flag("-q,--quiet", arguments->options.quiet, "no progress");
+  command->footer(
+      "Examples:\n"
+      "  quadruped3d evaluate --config configs/world_evaluation.json --checkpoint "
+      "out/stage1/model.safetensors \\\n"
+      "      --out out/stage1/evaluation\n"
+      "  quadruped3d evaluate -c my.json -o out/eval --limit 50                      a quick look\n"
+      "  quadruped3d evaluate -c my.json -o out/eval --tta 30 --visible 0.7,0.5,0.3  with adaptation\n"
+      "  quadruped3d evaluate -c my.json -o out/eval --tta-curve 0,5,10,20,30,50,70  does it overfit?\n"
+      "docs/evaluation.md defines every number.");
+  return [arguments] { return run(*arguments); };
+}
+
+}  // namespace q3d::pipeline::cli

@@ -1,0 +1,65 @@
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <memory>
+
+#include "pipeline/cli/commands.h"
+#include "pipeline/evaluation/labels.h"
+
+namespace q3d::pipeline::cli {
+namespace {
+
+struct Arguments {
+  std::vector<std::filesystem::path> configs;
+  evaluation::LabelOptions options;
+  std::filesystem::path report;
+  bool json = false;
+};
+
+int run(const Arguments& arguments) {
+  const evaluation::LabelEvaluation result =
+      evaluation::evaluate_labels(load_build_config(arguments.configs), arguments.options);
+  if (!arguments.report.empty()) evaluation::write_label_evaluation(arguments.report, result);
+  std::FILE* const people = arguments.json ? stderr : stdout;
+  fmt::print(people, "\n{}\n{}", result.dataset, evaluation::summary_text(result));
+  if (!arguments.report.empty()) {
+    fmt::print(people, "every candidate: {}\n", (arguments.report / "labels.csv").string());
+  }
+  if (arguments.json) fmt::print("{}\n", evaluation::to_json(result).dump());
+  return 0;
+}
+
+}  // namespace
+
+Command add_evaluate_labels(CLI::App& app) {
+  auto arguments = std::make_shared<Arguments>();
+  evaluation::LabelOptions& options = arguments->options;
+  CLI::App* command = app.add_subcommand("evaluate-labels", "how true are the labels that a build made?");
+  command->add_option("-c,--config", arguments->configs, "the build's config, thresholds included")
+      ->required()
+      ->check(CLI::ExistingFile);
+  command->add_option("-o,--out", options.run.out, "the build's output folder")
+      ->required()
+      ->check(CLI::ExistingDirectory);
+  command->add_option("--truth", options.truth, "hidden truth of the pool's pictures")
+      ->check(CLI::ExistingFile);
+  command->add_option("--masks", options.masks, "folder that the truth's mask paths start from")
+      ->check(CLI::ExistingDirectory);
+  command->add_option("--report", arguments->report, "folder for labels.json and labels.csv");
+  command->add_option("-t,--threads", options.run.threads, "threads that read and decode (0 = all cores)")
+      ->check(CLI::NonNegativeNumber);
+  command->add_flag("--json", arguments->json, "print labels.json on stdout");
+  command->add_flag("-q,--quiet", options.run.quiet, "no progress");
+  command->footer(
+      "Example:\n"
+      "  quadruped3d evaluate-labels --config configs/world_stage2.json --config out/thresholds.json --out "
+      "out \\\n"
+      "      --truth data/world/truth/superanimal_quadruped_train.json --masks data/world --report "
+      "out/labels\n"
+      "Measures the kept, the refined before and after, the discarded and the whole pool. Needs no network: "
+      "the "
+      "build's\npredictions are read from its output folder. docs/evaluation.md defines every number.");
+  return [arguments] { return run(*arguments); };
+}
+
+}  // namespace q3d::pipeline::cli

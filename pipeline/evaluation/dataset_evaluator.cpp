@@ -1,0 +1,185 @@
+#include "pipeline/evaluation/dataset_evaluator.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <memory>
+
+#include "pipeline/interrupt.h"
+#include "pipeline/unit_flow.h"
+#include "pipeline/unit_steps.h"
+
+namespace q3d::pipeline::evaluation {
+namespace {
+
+using manifests::Reason;
+
+constexpr std::size_t kUnitSize = 64;  // batches form inside a unit, so it is part of the numbers' last bits
+
+std::vector<Unit> cut_units(std::size_t candidates) {
+  std::vector<Unit> units;
+  for (std::size_t first = 0; first < candidates; first += kUnitSize) {
+    Unit unit;
+    unit.index = static_cast<std::int64_t>(units.size());
+    unit.first = first;
+    unit.count = std::min(kUnitSize, candidates - first);
+    units.push_back(unit);
+  }
+  return units;
+}
+
+// The samples of a unit that have a picture and a finite prediction.
+struct Measurable {
+  std::vector<std::size_t> samples;  // into the results
+  std::vector<PatchView> patches;
+  std::vector<BodyPrediction> bodies;
+  std::vector<Target> targets;
+};
+
+class RecordEvaluator {
+ public:
+  RecordEvaluator(std::vector<manifests::SampleRecord> records, const Instruments& instruments,
+                  Progress& progress)
+      : instruments_(instruments), progress_(progress), results_(records.size()) {
+    for (std::size_t i = 0; i < records.size(); ++i) {
+      SampleResult& result = results_[i];
+      result.id = records[i].id;
+      result.species = records[i].species;
+      result.family = records[i].family;
+      if (records[i].truth && records[i].truth->has_betas) result.true_betas = records[i].truth->betas;
+      if (records[i].failure == Reason::no_visible_keypoints) records[i].failure = Reason::none;
+      result.failure = records[i].failure;
+      result.detail = records[i].failure_detail;
+      candidates_.push_back({std::move(records[i]), {}});
+    }
+    units_ = cut_units(candidates_.size());
+  }
+
+  std::vector<SampleResult> run() {
+    UnitFlow flow;
+    flow.units = static_cast<std::int64_t>(units_.size());
+    flow.read = [this](std::int64_t index) {
+      auto work = std::make_shared<UnitWork>();
+      work->unit = &units_[static_cast<std::size_t>(index)];
+      work->candidates = std::span(candidates_).subspan(work->unit->first, work->unit->count);
+      return work;
+    };
+    flow.decode = [](UnitWork& work) { decode(work); };
+    flow.compute = [this](UnitWork& work) { compute(work); };
+    flow.write = [this](UnitWork& work) { progress_.advance(static_cast<std::int64_t>(work.unit->count)); };
+    pipeline::run(flow, *instruments_.device);
+    return std::move(results_);
+  }
+
+ private:
+  static void decode(UnitWork& work) {
+    work.decoded.assign(work.candidates.size(), {});
+    tbb::parallel_for(std::size_t{0}, work.candidates.size(), [&](std::size_t i) {
+      const manifests::SampleRecord& record = work.candidates[i].record;
+      if (interrupted() || record.failure != Reason::none) return;
+      work.decoded[i] = decode_sample(record, {.patch = true, .stored_crop = false, .mask_area = true}, {});
+    });
+  }
+
+  void compute(const UnitWork& work) {
+    Measurable unit = predict(work);
+    measure_setting(0, unit.bodies, unit);
+    std::size_t setting = 1;
+    for (const TtaPass& pass : instruments_.plan->passes) setting = adapt(pass, setting, unit);
+  }
+
+  Measurable predict(const UnitWork& work) {
+    std::vector<PatchView> patches;
+    std::vector<std::size_t> positions;
+    for (std::size_t i = 0; i < work.candidates.size(); ++i) {
+      const DecodedSample& decoded = work.decoded[i];
+      SampleResult& result = results_[work.unit->first + i];
+      if (result.failure != Reason::none) continue;
+      if (!decoded.detail.empty()) result.detail = decoded.detail;
+      result.failure = decoded.failure;
+      if (decoded.failure != Reason::none) continue;
+      patches.emplace_back(decoded.patch);
+      positions.push_back(i);
+    }
+    const std::vector<BodyPrediction> bodies = instruments_.network->predict(patches);
+    Measurable unit;
+    std::vector<const manifests::SampleRecord*> records;
+    for (std::size_t j = 0; j < bodies.size(); ++j) {
+      const std::size_t i = positions[j];
+      SampleResult& result = results_[work.unit->first + i];
+      if (!is_finite(bodies[j])) {
+        result.failure = Reason::prediction_not_finite;
+        result.detail = "the network's output holds NaN or infinity";
+        continue;
+      }
+      const manifests::SampleRecord& record = work.candidates[i].record;
+      unit.samples.push_back(work.unit->first + i);
+      unit.patches.push_back(patches[j]);
+      unit.bodies.push_back(bodies[j]);
+      unit.targets.push_back(make_target(record, work.decoded[i].mask_area_px));
+      records.push_back(&record);
+      result.normalised_by_mask = unit.targets.back().normalised_by_mask;
+      result.values.resize(instruments_.plan->settings.size());
+      result.betas.resize(instruments_.plan->settings.size());
+    }
+    add_true_meshes(records, *instruments_.meshes, unit.targets);
+    return unit;
+  }
+
+  // Measures what one pass gives; returns the setting after its last.
+  std::size_t adapt(const TtaPass& pass, std::size_t setting, const Measurable& unit) {
+    throw_if_interrupted();
+    std::vector<AdaptRequest> requests;
+    for (std::size_t j = 0; j < unit.samples.size(); ++j) {
+      AdaptRequest& request = requests.emplace_back();
+      request.patch = unit.patches[j];
+      request.keypoints = hide_keypoints(unit.targets[j].keypoints, pass.visible_share, instruments_.seed,
+                                         results_[unit.samples[j]].id);
+      request.iterations = pass.iterations;
+    }
+    const std::vector<AdaptOutcome> outcomes = instruments_.network->adapt(requests, pass.iterates);
+    const auto measure_all = [&](auto&& body_of) {
+      std::vector<BodyPrediction> bodies;
+      for (const AdaptOutcome& outcome : outcomes) bodies.push_back(body_of(outcome));
+      measure_setting(setting++, bodies, unit);
+    };
+    if (pass.iterates.empty()) measure_all([](const AdaptOutcome& outcome) { return outcome.best; });
+    for (std::size_t i = 0; i < pass.iterates.size(); ++i) {
+      measure_all([i](const AdaptOutcome& outcome) { return outcome.snapshots[i]; });
+    }
+    return setting;
+  }
+
+  void measure_setting(std::size_t setting, std::span<const BodyPrediction> bodies, const Measurable& unit) {
+    std::vector<BodyShape> shapes;
+    std::vector<std::size_t> with_mesh;
+    for (std::size_t j = 0; j < bodies.size(); ++j) {
+      if (unit.targets[j].vertices.empty()) continue;
+      shapes.push_back({bodies[j].rotations, bodies[j].betas});
+      with_mesh.push_back(j);
+    }
+    const std::vector<BodyMesh> posed = instruments_.meshes->pose(shapes);
+    std::vector<const BodyMesh*> mesh_of(bodies.size(), nullptr);
+    for (std::size_t m = 0; m < posed.size(); ++m) mesh_of[with_mesh[m]] = &posed[m];
+    for (std::size_t j = 0; j < bodies.size(); ++j) {
+      SampleResult& result = results_[unit.samples[j]];
+      result.values[setting] = measure(bodies[j], mesh_of[j], unit.targets[j]);
+      result.betas[setting] = bodies[j].betas;
+    }
+  }
+
+  const Instruments& instruments_;
+  Progress& progress_;
+  std::vector<Candidate> candidates_;
+  std::vector<Unit> units_;
+  std::vector<SampleResult> results_;  // a unit's own are written on the device's thread alone
+};
+
+}  // namespace
+
+std::vector<SampleResult> evaluate_records(std::vector<manifests::SampleRecord> records,
+                                           const Instruments& instruments, Progress& progress) {
+  return RecordEvaluator(std::move(records), instruments, progress).run();
+}
+
+}  // namespace q3d::pipeline::evaluation

@@ -1,0 +1,110 @@
+#include "pipeline/evaluation/evaluate.h"
+
+#include <fmt/format.h>
+#include <tbb/global_control.h>
+
+#include <chrono>
+#include <memory>
+#include <stdexcept>
+#include <thread>
+
+#include "loaders/dataset.h"
+#include "manifests/digest.h"
+#include "pipeline/errors.h"
+#include "pipeline/evaluation/dataset_evaluator.h"
+#include "pipeline/evaluation/hidden_truth.h"
+#include "pipeline/interrupt.h"
+
+namespace q3d::pipeline::evaluation {
+namespace {
+
+using manifests::SampleRecord;
+
+struct LoadedDataset {
+  DatasetResult result;  // without samples
+  std::vector<SampleRecord> records;
+};
+
+// Every n-th record, so that a quick look sees the whole file.
+std::vector<SampleRecord> evenly_spaced(std::vector<SampleRecord> records, std::int64_t limit) {
+  const auto wanted = static_cast<std::size_t>(limit);
+  if (limit <= 0 || wanted >= records.size()) return records;
+  std::vector<SampleRecord> some;
+  for (std::size_t i = 0; i < wanted; ++i) some.push_back(std::move(records[i * records.size() / wanted]));
+  return some;
+}
+
+LoadedDataset load(const EvaluatedDataset& dataset, std::int64_t limit) {
+  throw_if_interrupted();
+  const loaders::DatasetOptions& source = dataset.source;
+  LoadedDataset loaded;
+  loaders::Dataset read;
+  try {
+    read = loaders::load_dataset(source);
+  } catch (const std::invalid_argument& error) {
+    throw ConfigError(fmt::format("dataset {}: {}", source.name, error.what()));
+  }
+  loaded.result.name = source.name + "/" + source.split;
+  loaded.result.annotations_sha256 = manifests::sha256_file(source.root / source.annotations);
+  loaded.result.notes = std::move(read.notes);
+  loaded.result.listed = static_cast<std::int64_t>(read.records.size());
+  if (!dataset.truth.empty()) {
+    loaded.result.truth_sha256 = manifests::sha256_file(dataset.truth);
+    const std::size_t without = HiddenTruth(dataset.truth, dataset.masks).complete(read.records);
+    if (without > 0) {
+      loaded.result.notes.push_back(
+          fmt::format("{} of {} samples are not in the truth file", without, read.records.size()));
+    }
+  }
+  loaded.records = evenly_spaced(std::move(read.records), limit);
+  return loaded;
+}
+
+std::size_t flow_threads(int wanted) {
+  if (wanted > 0) return static_cast<std::size_t>(wanted);
+  return std::max<std::size_t>(1, std::thread::hardware_concurrency());
+}
+
+}  // namespace
+
+Evaluation evaluate(const EvaluationConfig& config, const EvaluationOptions& options) {
+  const auto start = std::chrono::steady_clock::now();
+  const tbb::global_control threads(tbb::global_control::max_allowed_parallelism,
+                                    flow_threads(options.threads));
+  const Plan plan = plan_settings(options.settings);
+  Evaluation evaluation;
+  evaluation.options = options;
+  evaluation.config = config.as_written;
+  evaluation.settings = plan.settings;
+  evaluation.checkpoint = config.network.checkpoint.filename().string();
+  evaluation.checkpoint_sha256 = manifests::sha256_file(config.network.checkpoint);
+  evaluation.smal_asset_sha256 = manifests::sha256_file(config.network.smal_asset);
+  evaluation.device_key = device_key(config.network);
+
+  std::vector<LoadedDataset> loaded;
+  std::int64_t total = 0;
+  for (const EvaluatedDataset& dataset : config.datasets) {
+    loaded.push_back(load(dataset, options.limit));
+    total += static_cast<std::int64_t>(loaded.back().records.size());
+  }
+
+  std::unique_ptr<Network> network;
+  std::unique_ptr<BodyMeshes> meshes;
+  DeviceWorker device;  // ends before what it works on
+  device.run([&] {
+    network = std::make_unique<Network>(config.network, config.tta);
+    meshes = std::make_unique<BodyMeshes>(config.network.smal_asset);
+  });
+  evaluation.device = network->device_description();
+  evaluation.device_warning = network->device_warning();
+  const Instruments instruments{&plan, meshes.get(), network.get(), &device, options.seed};
+  Progress progress("evaluated", total, options.quiet);
+  for (LoadedDataset& dataset : loaded) {
+    DatasetResult& result = evaluation.datasets.emplace_back(std::move(dataset.result));
+    result.samples = evaluate_records(std::move(dataset.records), instruments, progress);
+  }
+  evaluation.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return evaluation;
+}
+
+}  // namespace q3d::pipeline::evaluation

@@ -1,0 +1,66 @@
+// `evaluate`: the paper's metrics of a network on test sets.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "manifests/sample.h"
+#include "pipeline/evaluation/evaluation_config.h"
+#include "pipeline/evaluation/metric.h"
+#include "pipeline/evaluation/setting.h"
+
+namespace q3d::pipeline::evaluation {
+
+struct EvaluationOptions {
+  SettingOptions settings;
+  std::int64_t limit = 0;       // samples of each dataset, evenly spaced; 0 = all
+  std::uint64_t seed = 0;       // of hidden keypoints and of k-means
+  bool official_means = false;  // a sample without a value counts as 0
+  int threads = 0;              // that read and decode; 0 = all cores; never changes a byte
+  bool quiet = false;           // no progress
+};
+
+using Betas = std::array<float, manifests::kNumBetas>;
+
+struct SampleResult {
+  std::string id;
+  std::string species;  // empty when unknown
+  manifests::Family family = manifests::Family::none;
+  manifests::Reason failure = manifests::Reason::none;  // why it is left out of everything
+  std::string detail;
+  bool normalised_by_mask = false;
+  std::optional<Betas> true_betas;
+  std::vector<MetricValues> values;  // by setting; empty when it failed
+  std::vector<Betas> betas;          // by setting; empty when it failed
+};
+
+struct DatasetResult {
+  std::string name;  // dataset/split
+  std::string annotations_sha256;
+  std::string truth_sha256;  // of the hidden truth; empty when there is none
+  std::int64_t listed = 0;   // samples of the annotation file; `limit` may take fewer
+  std::vector<std::string> notes;
+  std::vector<SampleResult> samples;
+};
+
+struct Evaluation {
+  EvaluationOptions options;
+  nlohmann::json config;   // as the user wrote it
+  std::string checkpoint;  // file name
+  std::string checkpoint_sha256;
+  std::string smal_asset_sha256;
+  std::string device_key;      // what of the device decides the bits
+  std::string device;          // for people
+  std::string device_warning;  // a GPU that is present but cannot be used, and why; else empty
+  std::vector<Setting> settings;
+  std::vector<DatasetResult> datasets;
+  double seconds = 0.0;
+};
+
+// Predicts and, where asked to, adapts every sample in batches. A bad sample is a result with a reason.
+// Throws ConfigError, std::runtime_error, Interrupted.
+Evaluation evaluate(const EvaluationConfig& config, const EvaluationOptions& options);
+
+}  // namespace q3d::pipeline::evaluation

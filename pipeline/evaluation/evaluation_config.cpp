@@ -1,0 +1,70 @@
+#include "pipeline/evaluation/evaluation_config.h"
+
+#include <fmt/format.h>
+
+#include "pipeline/config_layers.h"
+#include "pipeline/errors.h"
+#include "pipeline/json_fields.h"
+
+namespace q3d::pipeline::evaluation {
+namespace {
+
+using nlohmann::json;
+namespace fs = std::filesystem;
+
+void resolve_paths(json& config, const fs::path& folder) {
+  if (config.contains("network")) {
+    resolve_path(config["network"], "checkpoint", folder);
+    resolve_path(config["network"], "smal_asset", folder);
+  }
+  if (!config.contains("datasets") || !config["datasets"].is_array()) return;
+  for (json& dataset : config["datasets"]) {
+    for (const char* key : {"root", "truth", "masks"}) resolve_path(dataset, key, folder);
+  }
+}
+
+// Takes key out of the object, which may be anything, and returns its text; empty when it is not there.
+fs::path take_path(json& object, const char* key, const std::string& where) {
+  if (!object.is_object() || !object.contains(key)) return {};
+  if (!object[key].is_string()) {
+    throw ConfigError(fmt::format("{}: \"{}\" must be a string, got {}", where, key, object[key].dump()));
+  }
+  const fs::path path = object[key].get<std::string>();
+  object.erase(key);
+  return path;
+}
+
+}  // namespace
+
+EvaluationConfig load_evaluation_config(const std::vector<fs::path>& files, const fs::path& checkpoint) {
+  ConfigLayers layers = read_config_layers(files, resolve_paths);
+  json& build = layers.resolved;
+  EvaluationConfig config;
+  if (build.contains("datasets") && build["datasets"].is_array()) {
+    for (std::size_t i = 0; i < build["datasets"].size(); ++i) {
+      const std::string where = fmt::format("{}: datasets[{}]", layers.where, i);
+      EvaluatedDataset& dataset = config.datasets.emplace_back();
+      dataset.truth = take_path(build["datasets"][i], "truth", where);
+      dataset.masks = take_path(build["datasets"][i], "masks", where);
+      if (dataset.truth.empty() && !dataset.masks.empty()) {
+        throw ConfigError(where +
+                          ": \"masks\" is the folder of a \"truth\" file's masks, and there is no "
+                          "\"truth\"; a format's own masks are found without it");
+      }
+    }
+  }
+  if (!checkpoint.empty() && (!build.contains("network") || build["network"].is_object())) {
+    build["network"]["checkpoint"] = fs::absolute(checkpoint).string();
+  }
+  const BuildConfig parsed = parse_build_config(build, layers.where);
+  if (parsed.network.checkpoint.empty()) {
+    throw ConfigError(layers.where + ": the key \"network\" is missing: there is no network to evaluate");
+  }
+  for (std::size_t i = 0; i < config.datasets.size(); ++i) config.datasets[i].source = parsed.datasets[i];
+  config.network = parsed.network;
+  config.tta = parsed.tta;
+  config.as_written = std::move(layers.as_written);
+  return config;
+}
+
+}  // namespace q3d::pipeline::evaluation

@@ -1,0 +1,35 @@
+// The configuration of an evaluation: that of a build, and where hidden truth lies. docs/evaluation.md
+// explains the keys.
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include <filesystem>
+#include <vector>
+
+#include "loaders/dataset.h"
+#include "pipeline/build_config.h"
+
+namespace q3d::pipeline::evaluation {
+
+struct EvaluatedDataset {
+  loaders::DatasetOptions source;
+  std::filesystem::path truth;  // hidden truth of a 2D-only set; empty when there is none
+  std::filesystem::path masks;  // folder that the truth's mask paths start from; empty: masks are not used
+};
+
+struct EvaluationConfig {
+  std::vector<EvaluatedDataset> datasets;
+  NetworkConfig network;
+  TtaConfig tta;
+  nlohmann::json as_written;  // the merged JSON, paths as the user wrote them
+};
+
+// Reads the files in order; a later file's keys replace an earlier one's. Relative paths are relative to the
+// file that names them. `checkpoint`, unless empty, takes the place of network.checkpoint. A build's config
+// can be read as it is: what concerns the build alone is checked and not used. Throws ConfigError naming
+// file, key, got and expected.
+EvaluationConfig load_evaluation_config(const std::vector<std::filesystem::path>& files,
+                                        const std::filesystem::path& checkpoint);
+
+}  // namespace q3d::pipeline::evaluation

@@ -1,0 +1,207 @@
+#include "pipeline/evaluation/labels.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <stdexcept>
+
+#include "manifests/digest.h"
+#include "pipeline/evaluation/hidden_truth.h"
+#include "pipeline/interrupt.h"
+#include "pipeline/progress.h"
+#include "pipeline/unit_steps.h"
+
+namespace q3d::pipeline::evaluation {
+namespace {
+
+using manifests::Reason;
+using manifests::Verdict;
+
+constexpr std::size_t kChunk = 64;  // candidates whose meshes are in memory together
+
+// The pool's records, completed by the truth files, with the true keypoints where a file has them.
+struct Truths {
+  std::vector<manifests::SampleRecord> records;
+  std::vector<std::optional<manifests::Keypoints>> keypoints;
+};
+
+Truths read_truths(const JudgedPool& pool, const LabelOptions& options, LabelEvaluation& evaluation) {
+  Truths truths;
+  for (const JudgedCandidate& candidate : pool.candidates) truths.records.push_back(candidate.record);
+  truths.keypoints.resize(truths.records.size());
+  for (const auto& file : options.truth) {
+    throw_if_interrupted();
+    const HiddenTruth truth(file, options.masks);
+    truth.complete(truths.records);
+    for (std::size_t i = 0; i < truths.records.size(); ++i) {
+      if (const PictureTruth* found = truth.find(truths.records[i].image_ref))
+        truths.keypoints[i] = found->keypoints;
+    }
+    evaluation.truth_sha256.push_back(manifests::sha256_file(file));
+  }
+  return truths;
+}
+
+class LabelMeasurer {
+ public:
+  LabelMeasurer(const JudgedPool& pool, const Truths& truths, const BodyMeshes& meshes)
+      : pool_(pool), truths_(truths), meshes_(meshes) {}
+
+  // Candidates [first, first + count).
+  std::vector<MeasuredCandidate> measure_some(std::size_t first, std::size_t count) {
+    std::vector<double> mask_areas(count, 0.0);
+    tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
+      if (interrupted()) return;
+      mask_areas[i] = decode_sample(truths_.records[first + i],
+                                    {.patch = true, .stored_crop = false, .mask_area = true}, {})
+                          .mask_area_px;
+    });
+    throw_if_interrupted();
+    std::vector<Target> targets;
+    std::vector<const manifests::SampleRecord*> records;
+    for (std::size_t i = 0; i < count; ++i) {
+      records.push_back(&truths_.records[first + i]);
+      targets.push_back(make_target(*records[i], mask_areas[i]));
+    }
+    add_true_meshes(records, meshes_, targets);
+    std::vector<MeasuredCandidate> measured;
+    for (std::size_t i = 0; i < count; ++i) measured.push_back(measure_one(first + i, targets[i]));
+    return measured;
+  }
+
+ private:
+  MeasuredCandidate measure_one(std::size_t index, const Target& target) const {
+    const JudgedCandidate& candidate = pool_.candidates[index];
+    MeasuredCandidate measured;
+    measured.id = candidate.record.id;
+    measured.verdict = candidate.verdict;
+    measured.reason = candidate.reason;
+    measured.normalised_by_mask = target.normalised_by_mask;
+    measured.has_truth = target.keypoints_3d.has_value();
+    std::optional<Target> projected;
+    if (truths_.keypoints[index]) {
+      manifests::SampleRecord record = candidate.record;
+      record.keypoints = *truths_.keypoints[index];
+      projected.emplace();
+      projected->keypoints = crop_keypoints(record);
+      projected->normaliser_px = target.normaliser_px;
+    }
+    measured.predicted = measure_body(candidate.predicted, target, projected);
+    if (candidate.refined) {
+      measured.label = measure_body(*candidate.refined, target, projected);
+    } else if (candidate.label() != nullptr) {
+      measured.label = measured.predicted;
+    }
+    return measured;
+  }
+
+  MeasuredBody measure_body(const BodyPrediction& body, const Target& target,
+                            const std::optional<Target>& projected) const {
+    MeasuredBody measured;
+    std::vector<BodyMesh> mesh;
+    if (!target.vertices.empty()) {
+      const BodyShape shape{body.rotations, body.betas};
+      mesh = meshes_.pose(std::span(&shape, 1));
+    }
+    measured.annotated = measure(body, mesh.empty() ? nullptr : &mesh.front(), target);
+    if (projected) measured.projected = measure(body, nullptr, *projected);
+    return measured;
+  }
+
+  const JudgedPool& pool_;
+  const Truths& truths_;
+  const BodyMeshes& meshes_;
+};
+
+bool is_kept(const MeasuredCandidate& candidate) {
+  return candidate.label.has_value();
+}
+
+struct Group {
+  std::string name;
+  bool by_label = false;
+  bool (*holds)(const MeasuredCandidate&) = nullptr;
+};
+
+const std::vector<Group>& groups() {
+  static const auto kRefined = [](const MeasuredCandidate& c) { return c.verdict == Verdict::refined; };
+  static const std::vector<Group> kGroups{
+      {"pool", false, [](const MeasuredCandidate&) { return true; }},
+      {"kept", true, is_kept},
+      {"kept", false, is_kept},
+      {"retained", true, [](const MeasuredCandidate& c) { return c.verdict == Verdict::retained; }},
+      {"refined", true, kRefined},
+      {"refined", false, kRefined},
+      {"discarded", false, [](const MeasuredCandidate& c) { return c.verdict == Verdict::discarded; }},
+  };
+  return kGroups;
+}
+
+LabelRow make_row(const std::string& group, bool by_label,
+                  const std::vector<const MeasuredCandidate*>& some) {
+  LabelRow row;
+  row.group = group;
+  row.bodies = by_label ? "label" : "prediction";
+  row.samples = static_cast<std::int64_t>(some.size());
+  std::vector<const MetricValues*> annotated, projected;
+  for (const MeasuredCandidate* candidate : some) {
+    const MeasuredBody& body = by_label ? *candidate->label : candidate->predicted;
+    annotated.push_back(&body.annotated);
+    projected.push_back(&body.projected);
+    row.by_mask += candidate->normalised_by_mask ? 1 : 0;
+  }
+  for (std::size_t m = 0; m < kMetricCount; ++m) {
+    row.annotated[m] = mean_of(annotated, m);
+    row.projected[m] = mean_of(projected, m);
+  }
+  return row;
+}
+
+}  // namespace
+
+std::vector<LabelRow> group_labels(const std::vector<MeasuredCandidate>& candidates) {
+  std::vector<LabelRow> rows;
+  for (const Group& group : groups()) {
+    std::vector<const MeasuredCandidate*> some;
+    for (const MeasuredCandidate& candidate : candidates) {
+      if (group.holds(candidate)) some.push_back(&candidate);
+    }
+    if (!some.empty()) rows.push_back(make_row(group.name, group.by_label, some));
+  }
+  std::map<std::string, std::vector<const MeasuredCandidate*>> reasons;
+  for (const MeasuredCandidate& candidate : candidates) {
+    if (candidate.verdict != Verdict::discarded) continue;
+    reasons["discarded: " + std::string(manifests::to_string(candidate.reason))].push_back(&candidate);
+  }
+  for (const auto& [reason, some] : reasons) rows.push_back(make_row(reason, false, some));
+  return rows;
+}
+
+LabelEvaluation evaluate_labels(const BuildConfig& config, const LabelOptions& options) {
+  Workspace workspace(config, options.run);
+  const JudgedPool pool = read_judged_pool(config, workspace);
+  LabelEvaluation evaluation;
+  evaluation.dataset = pool.dataset;
+  evaluation.content_id = pool.content_id;
+  evaluation.failed = pool.failed;
+  const Truths truths = read_truths(pool, options, evaluation);
+  const BodyMeshes meshes(config.network.smal_asset);
+  LabelMeasurer measurer(pool, truths, meshes);
+  Progress progress("measured", static_cast<std::int64_t>(pool.candidates.size()), options.run.quiet);
+  for (std::size_t first = 0; first < pool.candidates.size(); first += kChunk) {
+    const std::size_t count = std::min(kChunk, pool.candidates.size() - first);
+    for (MeasuredCandidate& measured : measurer.measure_some(first, count)) {
+      evaluation.without_truth += measured.has_truth ? 0 : 1;
+      evaluation.candidates.push_back(std::move(measured));
+    }
+    progress.advance(static_cast<std::int64_t>(count));
+  }
+  if (!evaluation.candidates.empty() &&
+      evaluation.without_truth == static_cast<std::int64_t>(evaluation.candidates.size())) {
+    throw std::runtime_error("no candidate of the pool has a truth; give the pool's own file with --truth");
+  }
+  evaluation.rows = group_labels(evaluation.candidates);
+  return evaluation;
+}
+
+}  // namespace q3d::pipeline::evaluation

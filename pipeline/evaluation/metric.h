@@ -1,0 +1,65 @@
+// The metrics of the paper's tables on one sample. docs/evaluation.md defines each number.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "pipeline/body_meshes.h"
+#include "pipeline/network.h"
+
+namespace q3d::pipeline::evaluation {
+
+enum class Metric : std::uint8_t { auc, pck_10, pck_15, l_proj, pa_mpjpe, pa_mpvpe };
+inline constexpr std::size_t kMetricCount = 6;
+
+struct MetricInfo {
+  Metric metric;
+  const char* key;    // in JSON and CSV
+  const char* title;  // in tables for people
+  int decimals;       // shown in tables for people
+  bool higher_is_better;
+  bool needs_body;  // 3D truth; the others need a visible keypoint
+};
+// In the order of the enumerators.
+extern const std::array<MetricInfo, kMetricCount> kMetrics;
+
+// By Metric; nothing where the sample lacks what the metric needs. auc, pck_*: percent; l_proj: crop units;
+// pa_*: mm where the body's unit is the metre.
+using MetricValues = std::array<std::optional<double>, kMetricCount>;
+inline std::size_t index_of(Metric metric) {
+  return static_cast<std::size_t>(metric);
+}
+
+struct MetricMean {
+  std::optional<double> mean;
+  std::int64_t samples = 0;  // behind the mean
+};
+// Of one metric over samples; a sample without a value is left out, or counts as 0.
+MetricMean mean_of(std::span<const MetricValues* const> samples, std::size_t metric,
+                   bool missing_is_zero = false);
+
+// What a prediction is measured against.
+struct Target {
+  CropKeypoints keypoints{};     // annotated, crop units and weight
+  double normaliser_px = 256.0;  // sqrt(mask area) of the 256-px crop, or 256 for the whole crop
+  bool normalised_by_mask = false;
+  std::optional<std::array<float, manifests::kNumKeypoints * 3>> keypoints_3d;  // SMAL units
+  std::vector<float> vertices;  // V x 3, SMAL units; empty when the true mesh is not known
+};
+
+// The target that a record and its decoded picture give, but for the mesh.
+Target make_target(const manifests::SampleRecord& record, double mask_area_px);
+
+// `mesh` is the predicted body's; it is needed when the target has vertices, and may be null otherwise.
+MetricValues measure(const BodyPrediction& body, const BodyMesh* mesh, const Target& target);
+
+// The true bodies of the records that state pose and shape, for their targets' vertices; keypoints_3d are
+// filled from the body where the record lacks them. `records` and `targets` go together.
+void add_true_meshes(std::span<const manifests::SampleRecord* const> records, const BodyMeshes& meshes,
+                     std::span<Target> targets);
+
+}  // namespace q3d::pipeline::evaluation

@@ -1,0 +1,46 @@
+// The settings under which the network is measured: its prediction as it is, and test-time adaptation of
+// several lengths and with fewer keypoints.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "pipeline/network.h"
+
+namespace q3d::pipeline::evaluation {
+
+struct Setting {
+  std::string name;  // "prediction", "TTA 30", "TTA 30 with 50 % of the keypoints", "iterate 20"
+  bool uses_test_keypoints = false;
+  int iterations = 0;          // adaptation steps at most
+  double visible_share = 1.0;  // of the visible keypoints that adaptation is given; metrics use all of them
+};
+
+// One adaptation of every sample: gives the kept iterate, or the iterates asked for.
+struct TtaPass {
+  int iterations = 0;
+  double visible_share = 1.0;
+  std::vector<int> iterates;  // ascending; empty = the kept one, of least L_proj
+};
+
+struct SettingOptions {
+  int tta_iterations = 0;                // 0 = no adaptation
+  std::vector<int> curve{};              // iterates to measure
+  std::vector<double> visible_shares{};  // needs tta_iterations
+};
+
+struct Plan {
+  std::vector<Setting> settings;  // the prediction, then what the passes give, in order
+  std::vector<TtaPass> passes;
+};
+
+// Throws ConfigError on negative iterations, shares outside (0, 1], or shares without tta_iterations.
+Plan plan_settings(const SettingOptions& options);
+
+// `keypoints` with all but ceil(share * visible) of the visible ones hidden: a random choice by seed and
+// sample id, the same on every machine. Of one sample, a smaller share's choice is part of a larger one's.
+CropKeypoints hide_keypoints(const CropKeypoints& keypoints, double share, std::uint64_t seed,
+                             const std::string& sample_id);
+
+}  // namespace q3d::pipeline::evaluation

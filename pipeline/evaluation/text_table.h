@@ -1,0 +1,27 @@
+// A table for a terminal: columns as wide as their widest cell, numbers to the right.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace q3d::pipeline::evaluation {
+
+class TextTable {
+ public:
+  // `text_columns`: the first so many columns are aligned to the left.
+  TextTable(std::vector<std::string> header, std::size_t text_columns);
+  void add(
+      std::vector<std::string> row);  // throws std::logic_error on another number of cells than the header
+  bool empty() const { return rows_.size() == 1; }
+  std::string text() const;  // header and rows, a line each, no trailing spaces
+
+ private:
+  std::vector<std::vector<std::string>> rows_;
+  std::size_t text_columns_;
+};
+
+// "-" for nothing.
+std::string cell(const std::optional<double>& value, int decimals);
+
+}  // namespace q3d::pipeline::evaluation
