@@ -79,7 +79,7 @@ class ReducedBackward : public AveragedBackward {
   }
 
  private:
-  const RankPlace& place_;
+  RankPlace place_;
   std::unique_ptr<c10d::Reducer> reducer_;
 };
 

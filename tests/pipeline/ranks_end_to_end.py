@@ -138,27 +138,42 @@ class Ranks(unittest.TestCase):
         result = self.torchrun("odd", config=self.write_config("odd", batch=3), expect=1)
         self.assertIn("a batch of 3 samples cannot be shared equally by 2 ranks", result.stderr)
 
-    def test_a_signal_to_one_rank_ends_all_after_the_state_is_saved(self):
+    def test_signals_end_all_ranks_after_the_state_is_saved(self):
+        """To one rank alone; and to the launcher, as Ctrl-C does, which passes it on to every rank."""
         steps = [{"name": "long", "pools": ["truth"], "steps": 100000}]
         config = self.write_config("long", stages={"1": steps})
-        process = subprocess.Popen([*self.launcher(), *self.command("long", config=config)], text=True,
+        self.assertGreaterEqual(self.steps_before_signal("long", config, lambda launcher: self.rank(launcher, 1)), 2)
+        saved = (self.root / "long/state.safetensors").read_bytes()
+        self.assertGreaterEqual(self.steps_before_signal("long", config, lambda launcher: launcher), 4)
+        self.assertNotEqual(saved, (self.root / "long/state.safetensors").read_bytes())
+
+    def steps_before_signal(self, out, config, target):
+        """Runs until the log has two more lines, interrupts the process that target(launcher's id) names, and returns
+        how many steps the log then holds."""
+        log = self.root / out / "log.jsonl"
+        lines = lambda: log.read_text().count("\n") if log.exists() else 0
+        wanted = lines() + 2
+        process = subprocess.Popen([*self.launcher(), *self.command(out, config=config)], text=True,
                                    stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=self.environment())
-        log = self.root / "long/log.jsonl"
         deadline = time.monotonic() + 240
-        while not (log.exists() and log.read_text().count("\n") >= 2):
+        while lines() < wanted:
             self.assertLess(time.monotonic(), deadline)
             self.assertIsNone(process.poll())
             time.sleep(0.2)
-        children = pathlib.Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
-        ranks = [int(child) for child in children
-                 if pathlib.Path(f"/proc/{child}/cmdline").read_bytes().startswith(PROGRAM.encode())]
-        self.assertEqual(len(ranks), 2)
-        second = next(rank for rank in ranks if b"\0RANK=1\0" in pathlib.Path(f"/proc/{rank}/environ").read_bytes())
-        os.kill(second, signal.SIGINT)
+        os.kill(target(process.pid), signal.SIGINT)
         _, errors = process.communicate(timeout=120)
         self.assertNotEqual(process.returncode, 0)
         self.assertIn("run the same command to go on", errors)
-        self.assertTrue((self.root / "long/state.safetensors").exists(), errors)
+        self.assertTrue((self.root / out / "state.safetensors").exists(), errors)
+        return lines()
+
+    @staticmethod
+    def rank(launcher, number):
+        """The process id of a rank."""
+        children = pathlib.Path(f"/proc/{launcher}/task/{launcher}/children").read_text().split()
+        return next(int(child) for child in children if
+                    pathlib.Path(f"/proc/{child}/cmdline").read_bytes().startswith(PROGRAM.encode()) and
+                    f"\0RANK={number}\0".encode() in pathlib.Path(f"/proc/{child}/environ").read_bytes())
 
 
 if __name__ == "__main__":
