@@ -19,6 +19,27 @@ void require(bool holds, const std::string& where, const std::string& what) {
   if (!holds) throw ConfigError(where + ": " + what);
 }
 
+// What only labels of one's own need: their keypoints are not known beforehand.
+void read_label_options(JsonFields& fields, DatasetConfig& options) {
+  const bool is_own = options.format == "coco" || options.format == "deeplabcut";
+  for (const char* key : {"topology", "species", "min_confidence", "box_margin"}) {
+    require(is_own || fields.child(key) == nullptr, fields.where(),
+            fmt::format("\"{}\" belongs to the formats \"coco\" and \"deeplabcut\", got it with \"{}\"", key,
+                        options.format));
+  }
+  if (!is_own) return;
+  std::string topology;
+  fields.require("topology", topology);
+  fields.read("species", options.species);
+  fields.read("min_confidence", options.min_confidence);
+  fields.read("box_margin", options.box_margin);
+  require(options.min_confidence >= 0 && options.min_confidence <= 1, fields.where(),
+          fmt::format("\"min_confidence\" must be 0 to 1, got {}", options.min_confidence));
+  require(options.box_margin >= 0 && options.box_margin <= 2, fields.where(),
+          fmt::format("\"box_margin\" must be 0 to 2, got {}", options.box_margin));
+  options.topology = topology;
+}
+
 DatasetConfig parse_dataset(const json& object, const std::string& where) {
   DatasetConfig options;
   std::string root;
@@ -34,6 +55,7 @@ DatasetConfig parse_dataset(const json& object, const std::string& where) {
   fields.read("split", options.split);
   fields.read("images", images);
   fields.read("role", role);
+  read_label_options(fields, options);
   fields.finish();
   require_one_of(options.format, loaders::dataset_formats(), where + ": format");
   require(std::regex_match(options.name, std::regex("[A-Za-z0-9_.-]+")), where,
@@ -126,8 +148,12 @@ void resolve_paths(json& config, const fs::path& folder) {
     resolve_path(config["network"], "checkpoint", folder);
     resolve_path(config["network"], "smal_asset", folder);
   }
+  resolve_path(config, "veto", folder);
   if (config.contains("datasets") && config["datasets"].is_array()) {
-    for (auto& dataset : config["datasets"]) resolve_path(dataset, "root", folder);
+    for (auto& dataset : config["datasets"]) {
+      resolve_path(dataset, "root", folder);
+      resolve_path(dataset, "topology", folder);
+    }
   }
 }
 
@@ -138,6 +164,9 @@ BuildConfig parse_build_config(const json& merged, const std::string& where) {
   JsonFields fields(merged, where);
   fields.read("name", config.name);
   fields.read("version", config.version);
+  std::string veto;
+  fields.read("veto", veto);
+  config.veto = veto;
   if (const json* datasets = fields.child("datasets")) {
     require(datasets->is_array(), where, "\"datasets\" must be a list of objects");
     for (std::size_t i = 0; i < datasets->size(); ++i) {

@@ -64,7 +64,8 @@ struct BuildConfig {
   FilterConfig filter;
   ShardConfig shards;
   filters::TargetShares calibrate;
-  nlohmann::json as_written;  // the merged JSON, paths as the user wrote them
+  std::filesystem::path veto;  // ids to leave out (pipeline/veto.h); empty when there are none
+  nlohmann::json as_written;   // the merged JSON, paths as the user wrote them
 };
 
 // Reads the files in order; a later file's keys replace an earlier one's. Relative paths are relative to the

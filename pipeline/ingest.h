@@ -4,19 +4,28 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "manifests/digest.h"
 #include "manifests/sample.h"
 #include "pipeline/build_config.h"
+#include "pipeline/veto.h"
 
 namespace q3d::pipeline {
+
+// Why a candidate is left out whatever its prediction.
+struct Exclusion {
+  manifests::Reason reason = manifests::Reason::none;
+  std::string detail;  // for people
+};
 
 struct Candidate {
   manifests::SampleRecord record;
   std::string image_sha256;  // empty when the picture could not be read
   Role role = Role::pseudo;  // its dataset's
+  Exclusion exclusion{};
 };
 
 // A fixed run of candidates in ingest order: the grain of resume and of determinism. It becomes one shard.
@@ -25,17 +34,20 @@ struct Unit {
   std::size_t first = 0;  // into Ingest::candidates
   std::size_t count = 0;
   std::string input_digest;  // over the records, pictures and roles of the unit
+  std::string
+      label_digest;  // the same, and over what is left out: predictions do not depend on it, shards do
 };
 
 struct Ingest {
   std::vector<Candidate> candidates;  // dataset order of the config, then file order
   std::vector<Unit> units;
-  std::map<std::string, std::string> annotation_digests;  // "name/split" -> SHA-256 of its annotation file
+  std::map<std::string, std::string> annotation_digests;  // "name/split" -> SHA-256 of its annotation files
   std::vector<std::string> notes;                         // what the loaders want a person to know
+  std::optional<Veto> veto;                               // the user's, where there is one
 };
 
-// Loads every dataset and digests every picture (in parallel; unchanged files come from the cache). Throws
-// A record whose role asks for a body and that gives no pose is failed. Throws std::runtime_error for an
+// Loads every dataset and digests every picture (in parallel; unchanged files come from the cache). A record
+// whose role asks for a body and that gives no pose is failed. Throws std::runtime_error for an
 // annotation file that cannot be read, Interrupted.
 Ingest ingest(const BuildConfig& config, manifests::DigestCache& digests);
 

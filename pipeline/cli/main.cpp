@@ -40,7 +40,7 @@ int run(int argc, char** argv) {
       {"build", cli::add_build(app)},   {"calibrate", cli::add_calibrate(app)},
       {"verify", cli::add_verify(app)}, {"inspect", cli::add_inspect(app)},
       {"sample", cli::add_sample(app)}, {"init", cli::add_init(app)},
-      {"train", cli::add_train(app)},
+      {"train", cli::add_train(app)},   {"explain", cli::add_explain(app)},
   };
   try {
     app.parse(argc, argv);
