@@ -49,21 +49,28 @@ std::optional<Family> family_of_supercategory(const std::string& supercategory) 
   return Family::none;
 }
 
-// The species: the user's word, else the category's name where it is an animal's, else what the picture's
-// name tells, else the category's name as it stands.
+// The rule that leaves the animal of this name out, or "".
+std::string left_out_as(const std::string& name) {
+  return not_a_quadruped({.parent_class = {}, .animal_class = {}, .subclass = {}, .animal = name});
+}
+
+// The user's word, else the category's name where it is an animal's, else what the picture's name tells, else
+// the category's name as it stands.
+std::string species_of(const Category& category, const Loading& loading, const SampleRecord& sample) {
+  if (!loading.options.species.empty()) return normalised_species(loading.options.species);
+  const std::string named = normalised_species(category.name);
+  if (family_of_species(named) || !left_out_as(named).empty()) return named;
+  const std::string pictured = species_of_picture(sample.image_ref, sample.source);
+  return pictured.empty() ? named : pictured;
+}
+
 void add_animal(const std::map<std::int64_t, Category>& categories, Loading& loading,
                 RecordReader& annotation, SampleRecord& sample) {
   const auto id = annotation.integer("category_id");
   const auto found = id ? categories.find(*id) : categories.end();
   const Category category = found == categories.end() ? Category{} : found->second;
-  const std::string named = normalised_species(category.name);
-  sample.species = normalised_species(loading.options.species);
-  if (sample.species.empty() && family_of_species(named)) sample.species = named;
-  if (sample.species.empty()) sample.species = species_of_picture(sample.image_ref, sample.source);
-  if (sample.species.empty()) sample.species = named;
-  const std::string rule =
-      not_a_quadruped({.parent_class = {}, .animal_class = {}, .subclass = {}, .animal = sample.species});
-  if (!rule.empty()) {
+  sample.species = species_of(category, loading, sample);
+  if (const std::string rule = left_out_as(sample.species); !rule.empty()) {
     annotation.fail(Reason::not_a_quadruped, "category_id", rule, "a four-legged mammal");
     return;
   }

@@ -123,6 +123,15 @@ ordered_json describe_veto(const std::optional<Veto>& veto) {
   return {{"sha256", veto->sha256}, {"ids", veto->reasons.size()}, {"matched", veto->matched}};
 }
 
+ordered_json describe_leakage(const DatasetInputs& inputs) {
+  const std::optional<LeakageSummary>& leakage = inputs.ingest->leakage;
+  if (!leakage) return nullptr;
+  return {{"test_sets", leakage->test_sets},
+          {"test_pictures", leakage->test_pictures},
+          {"max_distance", inputs.config->leakage->max_distance},
+          {"excluded", leakage->excluded}};
+}
+
 ordered_json text_or_null(const std::string& text) {
   return text.empty() ? ordered_json(nullptr) : ordered_json(text);
 }
@@ -186,6 +195,7 @@ std::string dataset_json(const DatasetInputs& inputs, const std::vector<manifest
                                   {{"config", inputs.config->as_written},
                                    {"annotations", inputs.ingest->annotation_digests},
                                    {"veto", describe_veto(inputs.ingest->veto)},
+                                   {"leakage", describe_leakage(inputs)},
                                    {"checkpoint_sha256", text_or_null(inputs.assets->checkpoint)},
                                    {"smal_asset_sha256", text_or_null(inputs.assets->smal_asset)},
                                    {"device", text_or_null(inputs.device_key)},

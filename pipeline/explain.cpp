@@ -186,6 +186,7 @@ ordered_json describe_source(const VerdictLine& line, const Evidence& evidence) 
 std::string why(const ordered_json& verdict, const json& thresholds) {
   const auto text = [&](const char* key) { return verdict.at(key).get<std::string>(); };
   if (text("verdict") == "failed") return "It failed before it could be judged: " + text("detail") + ".";
+  if (text("reason") == "in_test_split") return "It was left out because " + text("detail") + ".";
   if (text("reason") == "vetoed") return "It was left out by the veto list: " + text("detail") + ".";
   if (verdict.at("initial_error").is_null()) {
     return "Its label comes from the annotation file; the fidelity rule judges predictions only.";

@@ -75,35 +75,6 @@ void digest_pictures(std::vector<Candidate>& candidates, manifests::DigestCache&
   throw_if_interrupted();
 }
 
-// What is left out changes a unit's labels, not its predictions.
-std::string digest_of_labels(const Unit& unit, const std::vector<Candidate>& candidates) {
-  std::string text;
-  for (std::size_t i = unit.first; i < unit.first + unit.count; ++i) {
-    const Exclusion& exclusion = candidates[i].exclusion;
-    if (exclusion.reason == Reason::none) continue;
-    text += fmt::format("{} {} {}\n", i - unit.first, to_string(exclusion.reason), exclusion.detail);
-  }
-  return text.empty() ? unit.input_digest : manifests::sha256(unit.input_digest + '\n' + text);
-}
-
-// Samples that the user's list names.
-void apply_veto(const std::filesystem::path& file, Ingest& result) {
-  if (file.empty()) return;
-  result.veto = read_veto(file);
-  Veto& veto = *result.veto;
-  for (Candidate& candidate : result.candidates) {
-    const auto found = veto.reasons.find(candidate.record.id);
-    if (found == veto.reasons.end()) continue;
-    candidate.exclusion = {Reason::vetoed, found->second};
-    ++veto.matched;
-  }
-  if (veto.matched < veto.reasons.size()) {
-    result.notes.push_back(fmt::format("veto {}: {} of its {} ids are no candidate's",
-                                       file.filename().string(), veto.reasons.size() - veto.matched,
-                                       veto.reasons.size()));
-  }
-}
-
 std::vector<Unit> cut_units(const std::vector<Candidate>& candidates, std::size_t unit_size) {
   std::vector<Unit> units;
   for (std::size_t first = 0; first < candidates.size(); first += unit_size) {
@@ -117,7 +88,7 @@ std::vector<Unit> cut_units(const std::vector<Candidate>& candidates, std::size_
       text += std::string(to_string(candidates[i].role)) + '\n';
     }
     unit.input_digest = manifests::sha256(text);
-    unit.label_digest = digest_of_labels(unit, candidates);
+    unit.label_digest = unit.input_digest;
     units.push_back(std::move(unit));
   }
   return units;
@@ -125,15 +96,23 @@ std::vector<Unit> cut_units(const std::vector<Candidate>& candidates, std::size_
 
 }  // namespace
 
+IngestedDataset read_dataset(const loaders::DatasetOptions& options, manifests::DigestCache& digests) {
+  throw_if_interrupted();
+  loaders::Dataset dataset = load(options);
+  for (auto& record : dataset.records) {
+    record.failure_detail = without_root(std::move(record.failure_detail), options.root);
+  }
+  std::string digest = digest_files(dataset.files, digests);
+  return {std::move(dataset), std::move(digest)};
+}
+
 Ingest ingest(const BuildConfig& config, manifests::DigestCache& digests) {
   Ingest result;
   for (const auto& options : config.datasets) {
-    throw_if_interrupted();
-    loaders::Dataset dataset = load(options);
+    auto [dataset, digest] = read_dataset(options, digests);
     const std::string name = options.name + "/" + options.split;
-    result.annotation_digests[name] = digest_files(dataset.files, digests);
+    result.annotation_digests[name] = std::move(digest);
     for (auto& record : dataset.records) {
-      record.failure_detail = without_root(std::move(record.failure_detail), options.root);
       check_role(options.role, record);
       result.candidates.push_back({std::move(record), {}, options.role});
     }
@@ -141,7 +120,6 @@ Ingest ingest(const BuildConfig& config, manifests::DigestCache& digests) {
   }
   require_unique_ids(result.candidates);
   digest_pictures(result.candidates, digests);
-  apply_veto(config.veto, result);
   digests.save();
   result.units = cut_units(result.candidates, static_cast<std::size_t>(config.shards.unit_size));
   return result;

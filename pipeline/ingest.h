@@ -38,17 +38,35 @@ struct Unit {
       label_digest;  // the same, and over what is left out: predictions do not depend on it, shards do
 };
 
+// What came of comparing the pool with the test sets.
+struct LeakageSummary {
+  std::map<std::string, std::string> test_sets;  // "name/split" -> SHA-256 of its annotation files
+  std::size_t test_pictures = 0;
+  std::size_t excluded = 0;  // candidates
+};
+
 struct Ingest {
   std::vector<Candidate> candidates;  // dataset order of the config, then file order
   std::vector<Unit> units;
   std::map<std::string, std::string> annotation_digests;  // "name/split" -> SHA-256 of its annotation files
   std::vector<std::string> notes;                         // what the loaders want a person to know
-  std::optional<Veto> veto;                               // the user's, where there is one
+
+  // Set by leave_out (pipeline/exclusions.h).
+  std::optional<Veto> veto;
+  std::optional<LeakageSummary> leakage;
 };
 
 // Loads every dataset and digests every picture (in parallel; unchanged files come from the cache). A record
 // whose role asks for a body and that gives no pose is failed. Throws std::runtime_error for an
 // annotation file that cannot be read, Interrupted.
 Ingest ingest(const BuildConfig& config, manifests::DigestCache& digests);
+
+// One dataset as ingest reads it: records without this machine's paths, and the digest of its annotation
+// files.
+struct IngestedDataset {
+  loaders::Dataset dataset;
+  std::string annotations_sha256;
+};
+IngestedDataset read_dataset(const loaders::DatasetOptions& options, manifests::DigestCache& digests);
 
 }  // namespace q3d::pipeline

@@ -82,7 +82,7 @@ manifests::Judgement judge_predicted(const Candidate& candidate, const Predicted
 }
 
 // What is excluded keeps its numbers; what failed stays failed.
-void leave_out(const Exclusion& exclusion, manifests::Judgement& judgement) {
+void apply_exclusion(const Exclusion& exclusion, manifests::Judgement& judgement) {
   if (exclusion.reason == Reason::none || judgement.verdict == Verdict::failed) return;
   judgement.verdict = Verdict::discarded;
   judgement.reason = exclusion.reason;
@@ -205,7 +205,7 @@ void judge_unit(UnitWork& work, const filters::Thresholds& thresholds) {
     }
   }
   for (std::size_t i = 0; i < work.candidates.size(); ++i) {
-    leave_out(work.candidates[i].exclusion, work.judgements[i]);
+    apply_exclusion(work.candidates[i].exclusion, work.judgements[i]);
     std::string& detail = work.judgements[i].detail;
     if (detail.empty()) detail = (*work.predicted)[i].detail;
   }

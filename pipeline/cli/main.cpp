@@ -37,10 +37,11 @@ int run(int argc, char** argv) {
       "  quadruped3d verify out\n"
       "`quadruped3d COMMAND --help` explains a command by example.");
   const std::vector<std::pair<std::string, cli::Command>> commands = {
-      {"build", cli::add_build(app)},   {"calibrate", cli::add_calibrate(app)},
-      {"verify", cli::add_verify(app)}, {"inspect", cli::add_inspect(app)},
-      {"sample", cli::add_sample(app)}, {"init", cli::add_init(app)},
-      {"train", cli::add_train(app)},   {"explain", cli::add_explain(app)},
+      {"build", cli::add_build(app)},     {"calibrate", cli::add_calibrate(app)},
+      {"verify", cli::add_verify(app)},   {"inspect", cli::add_inspect(app)},
+      {"sample", cli::add_sample(app)},   {"init", cli::add_init(app)},
+      {"train", cli::add_train(app)},     {"explain", cli::add_explain(app)},
+      {"leakage", cli::add_leakage(app)},
   };
   try {
     app.parse(argc, argv);

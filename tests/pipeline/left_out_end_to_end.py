@@ -13,9 +13,9 @@ import unittest
 
 import h5py
 import numpy as np
+from PIL import Image
 
-import end_to_end
-from end_to_end import PICTURES, UNIT, Scene, digests, run
+from end_to_end import Scene, run, write_annotations
 
 
 def verdicts(dataset):
@@ -31,6 +31,14 @@ def square_box(box):
     """Centre and side of the network's crop: floor((2x + w) / 2), max(w, h)."""
     x, y, w, h = box
     return (2 * x + w) // 2, (2 * y + h) // 2, max(w, h)
+
+
+def smooth_picture(seed, size=(200, 150)):
+    """Blobs of colour: structure at all scales, as photographs have, where noise has none that survives resizing."""
+    generator = np.random.default_rng(1000 + seed)
+    coarse = Image.fromarray(generator.integers(0, 255, (9, 12, 3), dtype=np.uint8)).resize(size, Image.Resampling.BICUBIC)
+    fine = Image.fromarray(generator.integers(0, 255, (36, 48, 3), dtype=np.uint8)).resize(size, Image.Resampling.BICUBIC)
+    return Image.blend(coarse, fine, 0.3)
 
 
 class LeftOut(unittest.TestCase):
@@ -102,6 +110,75 @@ class LeftOut(unittest.TestCase):
         bad.write_text("drawn/train/a.png#1\nwolf_1.jpg\n")
         self.assertIn("line 2", self.scene.build("bad_veto", "--veto", bad, expect=2).stderr)
         self.scene.build("bad_veto", "--veto", self.scene.root / "nowhere.txt", expect=2)
+
+    # --- leakage
+
+    def plant(self):
+        """A test set that holds pictures of the pool: as they are, under an ImageNet name, resized, recompressed and
+        mirrored; and one picture of its own. The pool's pictures 1 and 2 are copies of each other."""
+        root = self.scene.root / "planted"
+        images = root / "images"
+        images.mkdir(parents=True)
+        pictures = [smooth_picture(seed) for seed in range(9)]
+        names = [f"p{i}.png" for i in range(8)] + ["n02114367_52_777.png"]
+        pictures[2] = pictures[1].resize((150, 120)).transpose(Image.Transpose.FLIP_LEFT_RIGHT)
+        for name, picture in zip(names, pictures):
+            picture.save(images / name)
+        test = {"same.png": None, "n02114367_52.JPEG": smooth_picture(50), "small.jpg": pictures[4].resize((96, 72)),
+                "squeezed.jpg": pictures[5], "mirror.png": pictures[6].transpose(Image.Transpose.FLIP_LEFT_RIGHT),
+                "all.jpg": pictures[7].resize((210, 150)).transpose(Image.Transpose.FLIP_LEFT_RIGHT),
+                "own.png": smooth_picture(60)}
+        shutil.copy(images / "p3.png", images / "same.png")
+        for name, picture in test.items():
+            if picture is not None:
+                picture.save(images / name, **({"quality": 30} if not name.endswith("png") else {}))
+        record = self.scene.records[0]
+        write_annotations(root, [{**record, "img_path": f"images/{n}", "bbox": [4, 4, 60, 50]} for n in names])
+        write_annotations(root, [{**record, "img_path": f"images/{n}", "bbox": [4, 4, 60, 50]} for n in test],
+                          "test.json")
+        pool = {"name": "pool", "format": "prima", "root": "planted", "annotations": "train.json", "split": "train"}
+        held_out = {"name": "held", "format": "prima", "root": "planted", "annotations": "test.json", "split": "test"}
+        return self.scene.write_config("planted.json", datasets=[pool], leakage={"test_sets": [held_out]})
+
+    def test_planted_copies_are_found_listed_and_left_out(self):
+        config = self.plant()
+        out = self.scene.root / "planted_out"
+        summary = json.loads(run("leakage", "--config", config, "--out", out, "--json").stdout)
+        with open(out / "leaks.csv", newline="") as file:
+            leaks = {row["id"].split("/")[-1].split("#")[0]: row for row in csv.DictReader(file)}
+        expected = {"p3.png": ("same.png", "same file"), "n02114367_52_777.png": ("n02114367_52.JPEG", "same origin"),
+                    "p4.png": ("small.jpg", "looks alike"), "p5.png": ("squeezed.jpg", "looks alike"),
+                    "p6.png": ("mirror.png", "looks alike"), "p7.png": ("all.jpg", "looks alike")}
+        self.assertEqual(set(leaks), set(expected))
+        for name, (test, evidence) in expected.items():
+            self.assertIn(f"/{test}#", leaks[name]["test_id"])
+            self.assertEqual(leaks[name]["evidence"], evidence)
+        self.assertIn("mirrored", leaks["p6.png"]["detail"])
+        self.assertIn("mirrored", leaks["p7.png"]["detail"])
+        self.assertEqual((summary["leaks"], summary["groups"], summary["pictures_in_groups"]), (6, 1, 2))
+        with open(out / "duplicates.csv", newline="") as file:
+            twins = [row["id"].split("/")[-1] for row in csv.DictReader(file)]
+        self.assertEqual(twins, ["p1.png#1", "p2.png#2"])
+        # The build leaves out the same, whichever way it is asked.
+        self.scene.build("planted_out", config=config)
+        dataset = self.scene.latest("planted_out")
+        for row in verdicts(dataset):
+            name = row["id"].split("/")[-1].split("#")[0]
+            if name in expected:
+                self.assertEqual((row["verdict"], row["reason"]), ("discarded", "in_test_split"))
+                self.assertIn(f"held/test/images/{expected[name][0]}", row["detail"])
+            else:
+                self.assertNotEqual(row["reason"], "in_test_split")
+        manifest = json.loads((dataset / "dataset.json").read_text())
+        self.assertEqual(manifest["provenance"]["leakage"]["excluded"], 6)
+        self.assertEqual(manifest["provenance"]["leakage"]["test_pictures"], 7)
+        run("verify", dataset)
+        # A damaged or missing cache of hashes changes nothing.
+        cache = out / "picture_hashes.txt"
+        cache.write_text(cache.read_text()[:-30] + "\nrubbish\n")
+        self.assertTrue(json.loads(self.scene.build("planted_out", "--json", config=config).stdout)["up_to_date"])
+        cache.unlink()
+        self.assertTrue(json.loads(self.scene.build("planted_out", "--json", config=config).stdout)["up_to_date"])
 
     # --- explain
 
