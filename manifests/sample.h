@@ -81,6 +81,7 @@ enum class Reason : std::uint8_t {
   gain_too_small,   // relative gain < delta within the first ten iterations
   // discarded by the user
   vetoed,
+  in_test_split,  // its picture, or a copy of it, is in a test split
 };
 std::string_view to_string(Reason reason);
 Reason reason_from_string(std::string_view name);  // throws std::invalid_argument on an unknown name

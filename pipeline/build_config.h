@@ -55,6 +55,12 @@ struct ShardConfig {
   int crop_min_side_px = 480;
 };
 
+// Pictures of the pool that are in these sets too are left out of the pseudo labels.
+struct LeakageConfig {
+  std::vector<DatasetConfig> test_sets;
+  int max_distance = 6;  // bits of 64 in which the hashes of one picture's copies may differ
+};
+
 struct BuildConfig {
   std::string name = "quadruped3d";
   std::string version = "1.0.0";  // semantic version of the dataset, the user's own
@@ -64,7 +70,9 @@ struct BuildConfig {
   FilterConfig filter;
   ShardConfig shards;
   filters::TargetShares calibrate;
-  nlohmann::json as_written;  // the merged JSON, paths as the user wrote them
+  std::optional<LeakageConfig> leakage;
+  std::filesystem::path veto;  // ids to leave out (pipeline/veto.h); empty when there are none
+  nlohmann::json as_written;   // the merged JSON, paths as the user wrote them
 };
 
 // Reads the files in order; a later file's keys replace an earlier one's. Relative paths are relative to the

@@ -25,8 +25,8 @@ namespace {
 
 constexpr double kNoLimit = std::numeric_limits<double>::infinity();
 
-// L_proj of every candidate's prediction; NaN for the failed and for those that are not predicted. What an
-// earlier run predicted is not predicted again.
+// L_proj of every candidate's prediction; NaN for the excluded, the failed and for those that are not
+// predicted. What an earlier run predicted is not predicted again.
 std::vector<double> initial_errors(const BuildConfig& config, Workspace& workspace) {
   const Ingest& ingest = workspace.ingest();
   StageStore predictions(workspace.out(), "predict",
@@ -48,9 +48,11 @@ std::vector<double> initial_errors(const BuildConfig& config, Workspace& workspa
     if (!work.predicted) predict_unit(work, [&]() -> Network& { return workspace.network(); });
   };
   flow.write = [&](UnitWork& work) {
-    if (!work.predicted_before) predictions.save(*work.unit, to_table(*work.predicted));
+    if (!work.predicted_before) predictions.save(*work.unit, to_table(work.candidates, *work.predicted));
     for (std::size_t i = 0; i < work.candidates.size(); ++i) {
-      errors[work.unit->first + i] = initial_error(work.candidates[i], (*work.predicted)[i]);
+      const bool is_left_out = work.candidates[i].exclusion.reason != manifests::Reason::none;
+      errors[work.unit->first + i] = is_left_out ? std::numeric_limits<double>::quiet_NaN()
+                                                 : initial_error(work.candidates[i], (*work.predicted)[i]);
     }
     progress.advance(static_cast<std::int64_t>(work.unit->count), work.predicted_before);
   };

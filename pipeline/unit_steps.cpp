@@ -27,7 +27,8 @@ using manifests::Verdict;
 std::optional<Wanted> wanted(const UnitWork& work, std::size_t i, const filters::Thresholds* thresholds) {
   if (work.candidates[i].record.failure != Reason::none) return std::nullopt;
   const bool is_pseudo = work.candidates[i].role == Role::pseudo;
-  const bool makes_shard = thresholds != nullptr && !work.shard_before;
+  const bool is_left_out = work.candidates[i].exclusion.reason != Reason::none;
+  const bool makes_shard = thresholds != nullptr && !work.shard_before && !is_left_out;
   if (!work.predicted) return Wanted{is_pseudo, makes_shard};
   if (thresholds == nullptr || (*work.predicted)[i].failure != Reason::none) return std::nullopt;
   if (!is_pseudo) return makes_shard ? std::optional(Wanted{false, true}) : std::nullopt;
@@ -78,6 +79,14 @@ manifests::Judgement judge_predicted(const Candidate& candidate, const Predicted
   if (predicted.failure != Reason::none) return failed(predicted.failure, predicted.detail);
   if (candidate.role != Role::pseudo) return judge_annotated(candidate, predicted.body);
   return filters::judge_initial(initial_error(candidate, predicted), thresholds);
+}
+
+// What is excluded keeps its numbers; what failed stays failed.
+void apply_exclusion(const Exclusion& exclusion, manifests::Judgement& judgement) {
+  if (exclusion.reason == Reason::none || judgement.verdict == Verdict::failed) return;
+  judgement.verdict = Verdict::discarded;
+  judgement.reason = exclusion.reason;
+  judgement.detail = exclusion.detail;
 }
 
 // The body of a candidate whose role is not `pseudo`, and what its label will lack.
@@ -200,6 +209,7 @@ void judge_unit(UnitWork& work, const filters::Thresholds& thresholds) {
     }
   }
   for (std::size_t i = 0; i < work.candidates.size(); ++i) {
+    apply_exclusion(work.candidates[i].exclusion, work.judgements[i]);
     std::string& detail = work.judgements[i].detail;
     if (detail.empty()) detail = (*work.predicted)[i].detail;
   }

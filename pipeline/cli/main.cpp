@@ -42,6 +42,7 @@ int run(int argc, char** argv) {
       {"sample", cli::add_sample(app)},   {"init", cli::add_init(app)},
       {"train", cli::add_train(app)},     {"evaluate", cli::add_evaluate(app)},
       {"compare", cli::add_compare(app)}, {"evaluate-labels", cli::add_evaluate_labels(app)},
+      {"explain", cli::add_explain(app)}, {"leakage", cli::add_leakage(app)},
   };
   try {
     app.parse(argc, argv);
