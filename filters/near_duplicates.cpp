@@ -89,24 +89,17 @@ void HashIndex::search(std::uint64_t hash, std::vector<Match>& matches) const {
   }
 }
 
-std::vector<std::optional<Likeness>> nearest_likenesses(std::span<const manifests::PictureHash> queries,
-                                                        std::span<const manifests::PictureHash> references,
-                                                        int max_distance) {
-  std::vector<std::uint64_t> upright;
-  for (const manifests::PictureHash& reference : references) upright.push_back(reference.upright);
-  const HashIndex index(std::move(upright), max_distance);
-  std::vector<std::optional<Likeness>> nearest(queries.size());
+std::optional<Likeness> nearest_likeness(const HashIndex& references, const manifests::PictureHash& query) {
+  const auto rank = [](const Likeness& like) {
+    return std::tuple(like.distance, like.mirrored, like.position);
+  };
+  std::optional<Likeness> nearest;
   std::vector<HashIndex::Match> matches;
-  for (std::size_t i = 0; i < queries.size(); ++i) {
-    for (const bool mirrored : {false, true}) {
-      index.search(mirrored ? queries[i].mirrored : queries[i].upright, matches);
-      for (const HashIndex::Match& match : matches) {
-        const auto rank = [](const Likeness& like) {
-          return std::tuple(like.distance, like.mirrored, like.position);
-        };
-        const Likeness found{match.position, match.distance, mirrored};
-        if (!nearest[i] || rank(found) < rank(*nearest[i])) nearest[i] = found;
-      }
+  for (const bool mirrored : {false, true}) {
+    references.search(mirrored ? query.mirrored : query.upright, matches);
+    for (const HashIndex::Match& match : matches) {
+      const Likeness found{match.position, match.distance, mirrored};
+      if (!nearest || rank(found) < rank(*nearest)) nearest = found;
     }
   }
   return nearest;

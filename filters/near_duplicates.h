@@ -48,14 +48,12 @@ struct Likeness {
   bool mirrored = false;       // it is the mirror image that looks alike
 };
 
-// For each query the reference nearest to it within max_distance, upright or mirrored; of equals the upright,
-// then the first. Throws as HashIndex's constructor does.
-std::vector<std::optional<Likeness>> nearest_likenesses(std::span<const manifests::PictureHash> queries,
-                                                        std::span<const manifests::PictureHash> references,
-                                                        int max_distance);
+// Of an index over the references' upright hashes the nearest to the query, upright or mirrored, within the
+// index's distance; of equals the upright, then the first. Threads may ask one index at once.
+std::optional<Likeness> nearest_likeness(const HashIndex& references, const manifests::PictureHash& query);
 
 // Groups of pictures that are linked by likeness within max_distance, two or more each: positions ascending,
-// groups by their first. Throws as above.
+// groups by their first. Throws as HashIndex's constructor does.
 std::vector<std::vector<std::uint32_t>> groups_alike(std::span<const manifests::PictureHash> pictures,
                                                      int max_distance);
 

@@ -58,7 +58,7 @@ struct ShardConfig {
 // Pictures of the pool that are in these sets too are left out of the pseudo labels.
 struct LeakageConfig {
   std::vector<DatasetConfig> test_sets;
-  int max_distance = 6;  // bits of 64 in which the hashes of one picture's copies may differ
+  int max_distance = 4;  // bits of 64 in which the hashes of one picture's copies may differ
 };
 
 struct BuildConfig {

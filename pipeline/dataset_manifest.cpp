@@ -129,7 +129,8 @@ ordered_json describe_leakage(const DatasetInputs& inputs) {
   return {{"test_sets", leakage->test_sets},
           {"test_pictures", leakage->test_pictures},
           {"max_distance", inputs.config->leakage->max_distance},
-          {"excluded", leakage->excluded}};
+          {"excluded", leakage->excluded},
+          {"pictures_alike_in_pool", leakage->in_groups}};
 }
 
 ordered_json text_or_null(const std::string& text) {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "pipeline/leakage.h"
+#include "pipeline/leakage_lists.h"
 
 namespace q3d::pipeline {
 namespace {
@@ -10,9 +11,10 @@ namespace {
 using manifests::Reason;
 
 void leave_out_leaks(const BuildConfig& config, manifests::DigestCache& digests,
-                     const std::filesystem::path& cache_folder, bool quiet, Ingest& ingest) {
+                     const std::filesystem::path& out, bool quiet, Ingest& ingest) {
   if (!config.leakage) return;
-  LeakageReport report = find_leaks(*config.leakage, ingest, digests, cache_folder, false, quiet);
+  LeakageReport report = find_leaks(*config.leakage, ingest, digests, out, quiet);
+  write_leakage_lists(out, report, ingest);
   std::size_t others = 0;
   for (const Leak& leak : report.leaks) {
     Candidate& candidate = ingest.candidates[leak.candidate];
@@ -32,8 +34,14 @@ void leave_out_leaks(const BuildConfig& config, manifests::DigestCache& digests,
   if (others > 0) {
     ingest.notes.push_back(fmt::format(
         "leakage: {} samples that bring their own labels have a picture of a test set too, and are kept "
-        "(`quadruped3d leakage` lists them)",
+        "(leaks.csv in the output folder lists them)",
         others));
+  }
+  if (report.summary.groups > 0) {
+    ingest.notes.push_back(
+        fmt::format("leakage: {} pictures of the pool look like another, in {} groups, and are kept "
+                    "(duplicates.csv in the output folder lists them)",
+                    report.summary.in_groups, report.summary.groups));
   }
   ingest.leakage = std::move(report.summary);
 }
@@ -69,9 +77,9 @@ std::string label_digest(const Unit& unit, const std::vector<Candidate>& candida
 
 }  // namespace
 
-void leave_out(const BuildConfig& config, manifests::DigestCache& digests,
-               const std::filesystem::path& cache_folder, bool quiet, Ingest& ingest) {
-  leave_out_leaks(config, digests, cache_folder, quiet, ingest);
+void leave_out(const BuildConfig& config, manifests::DigestCache& digests, const std::filesystem::path& out,
+               bool quiet, Ingest& ingest) {
+  leave_out_leaks(config, digests, out, quiet, ingest);
   apply_veto(config.veto, ingest);
   digests.save();
   for (Unit& unit : ingest.units) unit.label_digest = label_digest(unit, ingest.candidates);

@@ -11,9 +11,9 @@
 namespace q3d::pipeline {
 
 // Marks them, tells of them in the notes, and renews the label digests of their units. Of leaks only those of
-// role `pseudo` are marked; the others are told. `cache_folder` keeps the pictures' hashes. Throws
-// ConfigError, std::runtime_error, Interrupted.
-void leave_out(const BuildConfig& config, manifests::DigestCache& digests,
-               const std::filesystem::path& cache_folder, bool quiet, Ingest& ingest);
+// role `pseudo` are marked; the others are told. `out` keeps the pictures' hashes and gets the lists of what
+// was found (pipeline/leakage_lists.h). Throws ConfigError, std::runtime_error, Interrupted.
+void leave_out(const BuildConfig& config, manifests::DigestCache& digests, const std::filesystem::path& out,
+               bool quiet, Ingest& ingest);
 
 }  // namespace q3d::pipeline

@@ -42,7 +42,9 @@ struct Unit {
 struct LeakageSummary {
   std::map<std::string, std::string> test_sets;  // "name/split" -> SHA-256 of its annotation files
   std::size_t test_pictures = 0;
-  std::size_t excluded = 0;  // candidates
+  std::size_t excluded = 0;   // candidates
+  std::size_t groups = 0;     // of pictures of the pool that look alike
+  std::size_t in_groups = 0;  // pictures
 };
 
 struct Ingest {

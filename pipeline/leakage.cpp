@@ -7,6 +7,7 @@
 #include <array>
 #include <optional>
 #include <unordered_map>
+#include <unordered_set>
 
 #include "filters/near_duplicates.h"
 #include "loaders/picture_origin.h"
@@ -22,21 +23,27 @@ using manifests::SampleRecord;
 
 // One picture file, whatever the number of animals in it.
 struct Picture {
-  std::string id;  // of its first sample
+  std::size_t sample = 0;  // its first one, by the caller's count
+  std::string id;          // of that
   std::string path;
   std::string sha256;
   std::string origin;
+  std::vector<std::size_t> elsewhere;  // the first sample of each other file of the same content
 };
 
 struct Pictures {
   std::vector<Picture> list;
   std::unordered_map<std::string, std::size_t> of_sha256;
+  std::unordered_set<std::string> other_paths;
 
   // Returns its place. The first sample of a picture gives its id, and a later one an origin it lacks.
-  std::size_t add(const SampleRecord& record, const std::string& sha256) {
+  std::size_t add(std::size_t sample, const SampleRecord& record, const std::string& sha256) {
     const auto [found, is_new] = of_sha256.emplace(sha256, list.size());
-    if (is_new) list.push_back({record.id, record.image_path, sha256, {}});
+    if (is_new) list.push_back({sample, record.id, record.image_path, sha256, {}, {}});
     Picture& picture = list[found->second];
+    if (record.image_path != picture.path && other_paths.insert(record.image_path).second) {
+      picture.elsewhere.push_back(sample);
+    }
     if (picture.origin.empty()) picture.origin = loaders::picture_origin(record.image_ref);
     return found->second;
   }
@@ -66,7 +73,7 @@ Pictures read_test_sets(const LeakageConfig& config, manifests::DigestCache& dig
     });
     throw_if_interrupted();
     for (std::size_t i = 0; i < shas.size(); ++i) {
-      if (!shas[i].empty()) pictures.add(dataset.records[i], shas[i]);
+      if (!shas[i].empty()) pictures.add(i, dataset.records[i], shas[i]);
     }
     const auto unread = std::count(shas.begin(), shas.end(), std::string());
     if (unread > 0) {
@@ -76,6 +83,7 @@ Pictures read_test_sets(const LeakageConfig& config, manifests::DigestCache& dig
     }
   }
   report.summary.test_pictures = pictures.list.size();
+  digests.save();
   return pictures;
 }
 
@@ -92,6 +100,12 @@ struct HashedPictures {
       places.push_back(i);
     }
   }
+
+  std::vector<std::uint64_t> hashes_upright() const {
+    std::vector<std::uint64_t> upright;
+    for (const PictureHash& hash : hashes) upright.push_back(hash.upright);
+    return upright;
+  }
 };
 
 // For each picture of the pool the test picture it is a copy of.
@@ -106,13 +120,14 @@ std::vector<std::optional<Copy>> find_copies(const Pictures& pool, const Picture
   std::vector<std::optional<Copy>> copies(pool.list.size());
   const HashedPictures hashed(pool, known);
   const HashedPictures references(tests, known);
-  const auto alike = filters::nearest_likenesses(hashed.hashes, references.hashes, max_distance);
-  for (std::size_t i = 0; i < alike.size(); ++i) {
-    if (!alike[i]) continue;
+  const filters::HashIndex index(references.hashes_upright(), max_distance);
+  tbb::parallel_for(std::size_t{0}, hashed.hashes.size(), [&](std::size_t i) {
+    const auto alike = filters::nearest_likeness(index, hashed.hashes[i]);
+    if (!alike) return;
     copies[hashed.places[i]] = {
-        references.places[alike[i]->position], CopyEvidence::looks_alike,
-        fmt::format("{} of 64 bits differ{}", alike[i]->distance, alike[i]->mirrored ? ", mirrored" : "")};
-  }
+        references.places[alike->position], CopyEvidence::looks_alike,
+        fmt::format("{} of 64 bits differ{}", alike->distance, alike->mirrored ? ", mirrored" : "")};
+  });
   std::unordered_map<std::string, std::size_t> of_origin;
   for (std::size_t i = 0; i < tests.list.size(); ++i) {
     if (!tests.list[i].origin.empty()) of_origin.emplace(tests.list[i].origin, i);
@@ -126,12 +141,29 @@ std::vector<std::optional<Copy>> find_copies(const Pictures& pool, const Picture
   return copies;
 }
 
+// Of pictures that look alike, and of files of one content, which are one picture elsewhere here.
 void add_groups(const Pictures& pool, const PictureHashes& known, int max_distance, LeakageReport& report) {
+  std::vector<bool> is_grouped(pool.list.size());
+  const auto add_files = [&](std::size_t place, std::vector<std::size_t>& samples) {
+    const Picture& picture = pool.list[place];
+    is_grouped[place] = true;
+    samples.push_back(picture.sample);
+    samples.insert(samples.end(), picture.elsewhere.begin(), picture.elsewhere.end());
+  };
   const HashedPictures hashed(pool, known);
   for (const auto& group : filters::groups_alike(hashed.hashes, max_distance)) {
-    std::vector<std::string>& ids = report.groups.emplace_back();
-    for (const std::uint32_t member : group) ids.push_back(pool.list[hashed.places[member]].id);
+    std::vector<std::size_t>& samples = report.groups.emplace_back();
+    for (const std::uint32_t member : group) add_files(hashed.places[member], samples);
   }
+  for (std::size_t i = 0; i < pool.list.size(); ++i) {
+    if (!is_grouped[i] && !pool.list[i].elsewhere.empty()) add_files(i, report.groups.emplace_back());
+  }
+  for (auto& group : report.groups) {
+    std::sort(group.begin(), group.end());
+    report.summary.in_groups += group.size();
+  }
+  std::sort(report.groups.begin(), report.groups.end());
+  report.summary.groups = report.groups.size();
 }
 
 }  // namespace
@@ -142,7 +174,7 @@ std::string_view to_string(CopyEvidence evidence) {
 }
 
 LeakageReport find_leaks(const LeakageConfig& config, const Ingest& pool, manifests::DigestCache& digests,
-                         const std::filesystem::path& cache_folder, bool with_groups, bool quiet) {
+                         const std::filesystem::path& cache_folder, bool quiet) {
   LeakageReport report;
   const Pictures tests = read_test_sets(config, digests, report);
   Pictures pictures;
@@ -151,7 +183,7 @@ LeakageReport find_leaks(const LeakageConfig& config, const Ingest& pool, manife
   for (std::size_t i = 0; i < pool.candidates.size(); ++i) {
     const Candidate& candidate = pool.candidates[i];
     if (!candidate.image_sha256.empty())
-      picture_of[i] = pictures.add(candidate.record, candidate.image_sha256);
+      picture_of[i] = pictures.add(i, candidate.record, candidate.image_sha256);
   }
   report.pool_pictures = pictures.list.size();
 
@@ -165,9 +197,10 @@ LeakageReport find_leaks(const LeakageConfig& config, const Ingest& pool, manife
   for (std::size_t i = 0; i < picture_of.size(); ++i) {
     if (picture_of[i] == kNone || !copies[picture_of[i]]) continue;
     const Copy& copy = *copies[picture_of[i]];
-    report.leaks.push_back({i, tests.list[copy.test_picture].id, copy.evidence, copy.detail});
+    const Picture& test = tests.list[copy.test_picture];
+    report.leaks.push_back({i, test.id, test.path, copy.evidence, copy.detail});
   }
-  if (with_groups) add_groups(pictures, hashes, config.max_distance, report);
+  add_groups(pictures, hashes, config.max_distance, report);
   return report;
 }
 

@@ -19,23 +19,26 @@ std::string_view to_string(CopyEvidence evidence);  // same file, same origin, l
 struct Leak {
   std::size_t candidate = 0;  // into Ingest::candidates
   std::string test_id;        // the first sample of that picture
+  std::string test_path;      // of the picture
   CopyEvidence evidence = CopyEvidence::same_file;
   std::string detail;  // for people: the common name, or the distance
 };
 
 struct LeakageReport {
   std::vector<Leak> leaks;  // by candidate; at most one each, the surest evidence
-  // Candidates' pictures that look alike or are the same file: ids, one a picture, two or more a group.
-  std::vector<std::vector<std::string>> groups;
+  // Files of the pool that look alike or have one content, each by its first candidate: two or more a group,
+  // ascending, groups by their first.
+  std::vector<std::vector<std::size_t>> groups;
   LeakageSummary summary;
   std::vector<std::string> notes;
   std::size_t pool_pictures = 0;  // distinct files
 };
 
-// Reads the test sets, hashes every picture that has no hash yet (kept in `cache_folder`/picture_hashes.txt)
-// and compares. `with_groups` also compares the pool with itself. Memory: 200 bytes a picture, whatever their
-// size. Throws ConfigError, std::runtime_error, Interrupted.
+// Reads the test sets, hashes every picture that has no hash yet (kept in `cache_folder`/picture_hashes.txt),
+// and compares the pool with them and with itself. Memory: below 1 kB a picture, whatever its size, and the
+// pictures that are being decoded, one a thread. The same report for any number of threads. Throws
+// ConfigError, std::runtime_error, Interrupted.
 LeakageReport find_leaks(const LeakageConfig& config, const Ingest& pool, manifests::DigestCache& digests,
-                         const std::filesystem::path& cache_folder, bool with_groups, bool quiet);
+                         const std::filesystem::path& cache_folder, bool quiet);
 
 }  // namespace q3d::pipeline

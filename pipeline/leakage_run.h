@@ -1,4 +1,4 @@
-// `leakage`: the pool of a config compared with its test sets and with itself, written as two lists.
+// `leakage`: the pool of a config compared with its test sets and with itself, written as lists and a page.
 #pragma once
 
 #include <cstddef>
@@ -13,8 +13,6 @@
 namespace q3d::pipeline {
 
 struct LeakageRunSummary {
-  std::filesystem::path leaks;       // CSV: id, test_id, evidence, detail, role
-  std::filesystem::path duplicates;  // CSV: group, id
   std::size_t candidates = 0;
   std::size_t pool_pictures = 0;
   std::size_t test_pictures = 0;
@@ -25,8 +23,8 @@ struct LeakageRunSummary {
   double seconds = 0.0;
 };
 
-// Needs no network. Writes leaks.csv and duplicates.csv into the output folder. Throws ConfigError,
-// std::runtime_error, Interrupted.
+// Needs no network. Writes leaks.csv, duplicates.csv, leakage.json and leakage.html into the output folder.
+// Throws ConfigError, std::runtime_error, Interrupted.
 LeakageRunSummary run_leakage(const BuildConfig& config, const RunOptions& options);
 
 }  // namespace q3d::pipeline

@@ -3,8 +3,11 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <charconv>
+#include <fstream>
 #include <set>
+#include <stdexcept>
 #include <string_view>
 
 #include "loaders/image.h"
@@ -19,8 +22,10 @@ namespace {
 
 using manifests::PictureHash;
 
-// Bumped when the hash of a picture changes: lines of another method are dropped.
+// Another name when the hash of a picture changes: lines of another method are dropped.
 constexpr std::string_view kMethod = "dct1";
+
+constexpr std::size_t kBlock = 4096;  // pictures between two writes of the file
 
 constexpr std::size_t kShaDigits = 64;
 constexpr std::size_t kHashDigits = 16;
@@ -74,16 +79,21 @@ void PictureHashes::add(const std::vector<PictureFile>& pictures, bool quiet) {
     if (hashes_.count(picture.sha256) == 0 && seen.insert(picture.sha256).second) fresh.push_back(&picture);
   }
   if (fresh.empty()) return;
-  std::vector<std::optional<PictureHash>> made(fresh.size());
-  Progress progress("pictures compared", static_cast<std::int64_t>(fresh.size()), quiet);
-  tbb::parallel_for(std::size_t{0}, fresh.size(), [&](std::size_t i) {
-    if (interrupted()) return;
-    made[i] = hash_file(fresh[i]->path);
-    progress.advance(1);
-  });
-  throw_if_interrupted();
-  for (std::size_t i = 0; i < fresh.size(); ++i) hashes_[fresh[i]->sha256] = made[i];
-  save();
+  Progress progress("pictures hashed", static_cast<std::int64_t>(fresh.size()), quiet);
+  for (std::size_t first = 0; first < fresh.size(); first += kBlock) {
+    const std::vector<const PictureFile*> block(
+        fresh.begin() + static_cast<std::ptrdiff_t>(first),
+        fresh.begin() + static_cast<std::ptrdiff_t>(std::min(first + kBlock, fresh.size())));
+    std::vector<std::optional<PictureHash>> made(block.size());
+    tbb::parallel_for(std::size_t{0}, block.size(), [&](std::size_t i) {
+      if (interrupted()) return;
+      made[i] = hash_file(block[i]->path);
+      progress.advance(1);
+    });
+    throw_if_interrupted();
+    for (std::size_t i = 0; i < block.size(); ++i) hashes_[block[i]->sha256] = made[i];
+    append(block);
+  }
 }
 
 std::optional<PictureHash> PictureHashes::find(const std::string& sha256) const {
@@ -91,10 +101,16 @@ std::optional<PictureHash> PictureHashes::find(const std::string& sha256) const 
   return found == hashes_.end() ? std::nullopt : found->second;
 }
 
-void PictureHashes::save() const {
-  std::string content;
-  for (const auto& [sha256, hash] : hashes_) content += manifests::seal_line(line_of(sha256, hash));
-  manifests::write_file_atomically(file_, content);
+// A line that a kill cuts short fails its check when read, and so does the one that is appended to it: two
+// pictures to hash again.
+void PictureHashes::append(const std::vector<const PictureFile*>& pictures) const {
+  std::string lines;
+  for (const PictureFile* picture : pictures) {
+    lines += manifests::seal_line(line_of(picture->sha256, hashes_.at(picture->sha256)));
+  }
+  std::ofstream stream(file_, std::ios::app | std::ios::binary);
+  stream << lines << std::flush;
+  if (!stream) throw std::runtime_error(fmt::format("{}: cannot be written to", file_.string()));
 }
 
 }  // namespace q3d::pipeline

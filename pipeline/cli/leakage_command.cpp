@@ -24,7 +24,7 @@ std::size_t count_leaks(const LeakageRunSummary& summary) {
   return count;
 }
 
-void print_summary(const LeakageRunSummary& summary) {
+void print_summary(const LeakageRunSummary& summary, const std::filesystem::path& out) {
   for (const std::string& note : summary.notes) fmt::print(stderr, "note: {}\n", note);
   fmt::print(stderr, "\n{} pictures of {} candidates compared with {} test pictures in {}\n",
              summary.pool_pictures, summary.candidates, summary.test_pictures,
@@ -35,7 +35,8 @@ void print_summary(const LeakageRunSummary& summary) {
   }
   fmt::print(stderr, "  groups of pictures of the pool that are alike: {} ({} pictures)\n", summary.groups,
              summary.pictures_in_groups);
-  fmt::print(stderr, "  lists: {}\n         {}\n", summary.leaks.string(), summary.duplicates.string());
+  fmt::print(stderr, "  to look at: {}\n  lists: leaks.csv, duplicates.csv and leakage.json beside it\n",
+             (out / "leakage.html").string());
   if (summary.test_pictures == 0) {
     fmt::print(stderr, "next: name the test sets under \"leakage\" in the config (docs/config.md)\n");
   } else {
@@ -53,7 +54,8 @@ Command add_leakage(CLI::App& app) {
   command->add_option("-c,--config", arguments->configs, "JSON config; a second one is laid over the first")
       ->required()
       ->check(CLI::ExistingFile);
-  command->add_option("-o,--out", arguments->run.out, "folder for the two lists and the cache of hashes")
+  command
+      ->add_option("-o,--out", arguments->run.out, "folder for the lists, the page and the cache of hashes")
       ->required();
   command->add_option("-t,--threads", arguments->run.threads, "threads that read and decode (0 = all cores)")
       ->check(CLI::NonNegativeNumber);
@@ -72,7 +74,7 @@ Command add_leakage(CLI::App& app) {
       "there.");
   return [arguments] {
     const LeakageRunSummary summary = run_leakage(load_build_config(arguments->configs), arguments->run);
-    print_summary(summary);
+    print_summary(summary, arguments->run.out);
     if (arguments->json) {
       const nlohmann::ordered_json document = {{"candidates", summary.candidates},
                                                {"pool_pictures", summary.pool_pictures},
@@ -81,8 +83,6 @@ Command add_leakage(CLI::App& app) {
                                                {"leaks_by_evidence", summary.leaks_by_evidence},
                                                {"groups", summary.groups},
                                                {"pictures_in_groups", summary.pictures_in_groups},
-                                               {"leaks_csv", summary.leaks.string()},
-                                               {"duplicates_csv", summary.duplicates.string()},
                                                {"seconds", summary.seconds}};
       fmt::print("{}\n", document.dump());
     }

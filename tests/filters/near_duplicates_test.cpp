@@ -54,21 +54,23 @@ TEST(HashIndex, an_empty_one_finds_nothing_and_far_distances_are_refused) {
   EXPECT_THROW(HashIndex({1}, -1), std::invalid_argument);
 }
 
-TEST(NearestLikenesses, takes_the_nearest_then_the_upright_then_the_first) {
-  const std::vector<PictureHash> references{{0xF0F0, 1}, {0xF0F1, 2}, {0xF0F1, 3}, {0x0F0F0000, 4}};
-  const std::vector<PictureHash> queries{
-      {0xF0F1, 0xFFFFFFFFFFFFFFFF},      // equal to references 1 and 2, one bit from 0
-      {0xFFFFFFFFFFFFFFFF, 0x0F0F0001},  // mirrored, one bit from reference 3
-      {0xFFFFFFFF00000000, 0xFFFFFFFF00000000}};
-  const auto nearest = nearest_likenesses(queries, references, 4);
-  ASSERT_TRUE(nearest[0] && nearest[1]);
-  EXPECT_EQ(nearest[0]->position, 1U);
-  EXPECT_EQ(nearest[0]->distance, 0);
-  EXPECT_FALSE(nearest[0]->mirrored);
-  EXPECT_EQ(nearest[1]->position, 3U);
-  EXPECT_EQ(nearest[1]->distance, 1);
-  EXPECT_TRUE(nearest[1]->mirrored);
-  EXPECT_FALSE(nearest[2]);
+TEST(NearestLikeness, takes_the_nearest_then_the_upright_then_the_first) {
+  const HashIndex references({0xF0F0, 0xF0F1, 0xF0F1, 0x0F0F0000}, 4);
+  const std::uint64_t far = 0xFFFFFFFFFFFFFFFF;
+  const auto equal = nearest_likeness(references, {0xF0F1, far});  // to 1 and 2; one bit from 0
+  ASSERT_TRUE(equal);
+  EXPECT_EQ(equal->position, 1U);
+  EXPECT_EQ(equal->distance, 0);
+  EXPECT_FALSE(equal->mirrored);
+  const auto turned = nearest_likeness(references, {far, 0x0F0F0001});  // mirrored, one bit from 3
+  ASSERT_TRUE(turned);
+  EXPECT_EQ(turned->position, 3U);
+  EXPECT_EQ(turned->distance, 1);
+  EXPECT_TRUE(turned->mirrored);
+  const auto both = nearest_likeness(references, {0xF0F3, 0xF0F3});
+  ASSERT_TRUE(both);
+  EXPECT_FALSE(both->mirrored);
+  EXPECT_FALSE(nearest_likeness(references, {0xFFFFFFFF00000000, 0xFFFFFFFF00000000}));
 }
 
 TEST(GroupsAlike, links_chains_mirror_images_and_equals) {

@@ -75,7 +75,7 @@ TEST(PerceptualHash, half_of_the_bits_are_set) {
 }
 
 TEST(PerceptualHash, sees_through_resizing_recompression_and_mirroring) {
-  constexpr int kLimit = 6;  // the config's default
+  constexpr int kLimit = 4;  // the config's default
   for (unsigned seed = 0; seed < 30; ++seed) {
     const cv::Mat picture = drawn(seed);
     const PictureHash hash = hash_of(picture);
@@ -110,7 +110,7 @@ TEST(PerceptualHash, tells_other_pictures_apart) {
                         distance(hashes[i].mirrored, hashes[j].upright)});
     }
   }
-  EXPECT_GT(least, 6) << "of 19,900 pairs, upright and mirrored";
+  EXPECT_GT(least, 4) << "of 19,900 pairs, upright and mirrored";
 }
 
 TEST(PerceptualHash, one_colour_has_none_and_other_types_are_refused) {

@@ -159,6 +159,8 @@ class LeftOut(unittest.TestCase):
         with open(out / "duplicates.csv", newline="") as file:
             twins = [row["id"].split("/")[-1] for row in csv.DictReader(file)]
         self.assertEqual(twins, ["p1.png#1", "p2.png#2"])
+        lists = {name: (out / name).read_bytes() for name in ("leaks.csv", "duplicates.csv", "leakage.json")}
+        self.assertEqual((out / "leakage.html").read_text().count("<img "), 6 * 2 + 2)
         # The build leaves out the same, whichever way it is asked.
         self.scene.build("planted_out", config=config)
         dataset = self.scene.latest("planted_out")
@@ -172,6 +174,9 @@ class LeftOut(unittest.TestCase):
         manifest = json.loads((dataset / "dataset.json").read_text())
         self.assertEqual(manifest["provenance"]["leakage"]["excluded"], 6)
         self.assertEqual(manifest["provenance"]["leakage"]["test_pictures"], 7)
+        self.assertEqual(manifest["provenance"]["leakage"]["pictures_alike_in_pool"], 2)
+        for name, content in lists.items():
+            self.assertEqual((out / name).read_bytes(), content)
         run("verify", dataset)
         # A damaged or missing cache of hashes changes nothing.
         cache = out / "picture_hashes.txt"
