@@ -47,6 +47,7 @@ DatasetConfig parse_dataset(const json& object, const std::string& where) {
   std::string annotations;
   std::string images;
   std::string role(to_string(options.role));
+  std::string curation;
   JsonFields fields(object, where);
   fields.require("name", options.name);
   fields.require("format", options.format);
@@ -56,6 +57,7 @@ DatasetConfig parse_dataset(const json& object, const std::string& where) {
   fields.read("split", options.split);
   fields.read("images", images);
   fields.read("role", role);
+  fields.read("curation", curation);
   read_label_options(fields, options);
   fields.finish();
   require_one_of(options.format, loaders::dataset_formats(), where + ": format");
@@ -69,8 +71,11 @@ DatasetConfig parse_dataset(const json& object, const std::string& where) {
   options.root = root;
   options.annotations = annotations;
   options.images = images;
+  options.curation = curation;
   return options;
 }
+
+}  // namespace
 
 std::vector<DatasetConfig> parse_datasets(const json& list, const std::string& where) {
   require(list.is_array(), where, "must be a list of objects");
@@ -80,6 +85,15 @@ std::vector<DatasetConfig> parse_datasets(const json& list, const std::string& w
   }
   return datasets;
 }
+
+void resolve_dataset_paths(json& object, const char* key, const fs::path& folder) {
+  if (!object.is_object() || !object.contains(key) || !object[key].is_array()) return;
+  for (json& dataset : object[key]) {
+    for (const char* path : {"root", "topology", "curation"}) resolve_path(dataset, path, folder);
+  }
+}
+
+namespace {
 
 LeakageConfig parse_leakage(const json& object, const std::string& where) {
   LeakageConfig leakage;
@@ -173,15 +187,8 @@ void resolve_paths(json& config, const fs::path& folder) {
     resolve_path(config["network"], "smal_asset", folder);
   }
   resolve_path(config, "veto", folder);
-  const auto resolve_datasets = [&](json& object, const char* key) {
-    if (!object.is_object() || !object.contains(key) || !object[key].is_array()) return;
-    for (auto& dataset : object[key]) {
-      resolve_path(dataset, "root", folder);
-      resolve_path(dataset, "topology", folder);
-    }
-  };
-  resolve_datasets(config, "datasets");
-  if (config.contains("leakage")) resolve_datasets(config["leakage"], "test_sets");
+  resolve_dataset_paths(config, "datasets", folder);
+  if (config.contains("leakage")) resolve_dataset_paths(config["leakage"], "test_sets", folder);
 }
 
 }  // namespace

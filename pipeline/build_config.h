@@ -20,6 +20,7 @@ namespace q3d::pipeline {
 // How a dataset is read, and what the build makes of it.
 struct DatasetConfig : loaders::DatasetOptions {
   Role role = Role::pseudo;
+  std::filesystem::path curation{};  // list of `curate` that names the pictures to take; empty takes all
 };
 
 struct NetworkConfig {
@@ -78,6 +79,12 @@ struct BuildConfig {
 // Reads the files in order; a later file's keys replace an earlier one's. Relative paths are relative to the
 // file that names them. Throws ConfigError naming file, key, got and expected.
 BuildConfig load_build_config(const std::vector<std::filesystem::path>& files);
+
+// A list of datasets, as "datasets" holds them; paths are absolute already. Throws ConfigError.
+std::vector<DatasetConfig> parse_datasets(const nlohmann::json& list, const std::string& where);
+
+// Makes the paths of the datasets in object[key] absolute, where it is a list of them.
+void resolve_dataset_paths(nlohmann::json& object, const char* key, const std::filesystem::path& folder);
 
 // Checks and converts merged JSON; `where` names it in messages.
 BuildConfig parse_build_config(const nlohmann::json& json, const std::string& where);

@@ -8,7 +8,7 @@
 #include <stdexcept>
 
 #include "manifests/record_json.h"
-#include "pipeline/errors.h"
+#include "pipeline/configured_dataset.h"
 #include "pipeline/interrupt.h"
 
 namespace q3d::pipeline {
@@ -31,14 +31,6 @@ void require_unique_ids(const std::vector<Candidate>& candidates) {
       throw std::runtime_error(fmt::format("the sample id {} occurs twice; ids must be unique within a build",
                                            candidate.record.id));
     }
-  }
-}
-
-loaders::Dataset load(const loaders::DatasetOptions& options) {
-  try {
-    return loaders::load_dataset(options);
-  } catch (const std::invalid_argument& error) {
-    throw ConfigError(fmt::format("dataset {}: {}", options.name, error.what()));
   }
 }
 
@@ -96,9 +88,9 @@ std::vector<Unit> cut_units(const std::vector<Candidate>& candidates, std::size_
 
 }  // namespace
 
-IngestedDataset read_dataset(const loaders::DatasetOptions& options, manifests::DigestCache& digests) {
+IngestedDataset read_dataset(const DatasetConfig& options, manifests::DigestCache& digests) {
   throw_if_interrupted();
-  loaders::Dataset dataset = load(options);
+  loaders::Dataset dataset = load_configured(options);
   for (auto& record : dataset.records) {
     record.failure_detail = without_root(std::move(record.failure_detail), options.root);
   }

@@ -63,12 +63,12 @@ struct Ingest {
 // annotation file that cannot be read, Interrupted.
 Ingest ingest(const BuildConfig& config, manifests::DigestCache& digests);
 
-// One dataset as ingest reads it: records without this machine's paths, and the digest of its annotation
-// files.
+// One dataset as ingest reads it: the chosen records where it is curated, without this machine's paths, and
+// the digest of its annotation files and that choice.
 struct IngestedDataset {
   loaders::Dataset dataset;
   std::string annotations_sha256;
 };
-IngestedDataset read_dataset(const loaders::DatasetOptions& options, manifests::DigestCache& digests);
+IngestedDataset read_dataset(const DatasetConfig& options, manifests::DigestCache& digests);
 
 }  // namespace q3d::pipeline

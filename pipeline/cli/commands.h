@@ -25,5 +25,6 @@ Command add_train(CLI::App& app);
 Command add_evaluate(CLI::App& app);
 Command add_evaluate_labels(CLI::App& app);
 Command add_compare(CLI::App& app);
+Command add_curate(CLI::App& app);
 
 }  // namespace q3d::pipeline::cli

@@ -43,6 +43,7 @@ int run(int argc, char** argv) {
       {"train", cli::add_train(app)},     {"evaluate", cli::add_evaluate(app)},
       {"compare", cli::add_compare(app)}, {"evaluate-labels", cli::add_evaluate_labels(app)},
       {"explain", cli::add_explain(app)}, {"leakage", cli::add_leakage(app)},
+      {"curate", cli::add_curate(app)},
   };
   try {
     app.parse(argc, argv);

@@ -82,12 +82,14 @@ TEST(BuildConfig, EveryPathIsRelativeToItsFile) {
   const testing::ScratchDir scratch;
   json document = good();
   document["datasets"][0] = own_labels();
+  document["datasets"][0]["curation"] = "chosen.csv";
   document["veto"] = "list.txt";
   document["leakage"] = {{"test_sets", document["datasets"]}};
   std::ofstream(scratch.path() / "c.json") << document;
   const BuildConfig config = load_build_config({scratch.path() / "c.json"});
   EXPECT_EQ(config.veto, scratch.path() / "list.txt");
   EXPECT_EQ(config.datasets[0].topology, scratch.path() / "goats.json");
+  EXPECT_EQ(config.datasets[0].curation, scratch.path() / "chosen.csv");
   EXPECT_EQ(config.leakage->test_sets[0].root, scratch.path() / "r");
   EXPECT_EQ(config.as_written["veto"], "list.txt");
 }

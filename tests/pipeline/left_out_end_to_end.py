@@ -185,6 +185,40 @@ class LeftOut(unittest.TestCase):
         cache.unlink()
         self.assertTrue(json.loads(self.scene.build("planted_out", "--json", config=config).stdout)["up_to_date"])
 
+    # --- curation
+
+    def test_a_build_takes_what_curate_chose(self):
+        record = self.scene.records[0]
+        for split, species in (("train", ["horse"] * 9 + ["wolf"] * 2 + ["skunk"]), ("test", ["wolf", "horse"])):
+            names = [f"images/{i:012}_{name}.png" for i, name in enumerate(species)]
+            for i, name in enumerate(names):
+                smooth_picture(100 + i).save(self.scene.data / name)
+            write_annotations(self.scene.data, [{**record, "img_path": name, "bbox": [4, 4, 60, 50]} for name in names],
+                              f"whole_{split}.json")
+        sets = [{"name": "whole", "format": "prima", "root": "data", "annotations": f"whole_{split}.json",
+                 "split": split} for split in ("train", "test")]
+        rule = self.scene.root / "rule.json"
+        rule.write_text(json.dumps({"name": "half", "datasets": sets, "pictures": {"train": 6, "test": 2},
+                                    "species": {"horse": ["horse"], "wolf": ["wolf"]}}))
+        out = self.scene.root / "curation"
+        summary = json.loads(run("curate", "--config", rule, "--out", out, "--json").stdout)
+        self.assertEqual(summary["verdicts"]["train"], {"chosen": 6, "not_drawn": 5, "species_not_listed": 1})
+        self.assertEqual(summary["chosen"], {"horse": {"test": 1, "train": 4}, "wolf": {"test": 1, "train": 2}})
+        first = (out / "half.csv").read_bytes()
+        run("curate", "--config", rule, "--out", out)
+        self.assertEqual((out / "half.csv").read_bytes(), first)
+        chosen = {row["picture"] for row in csv.DictReader(first.decode().splitlines())
+                  if (row["split"], row["verdict"]) == ("train", "chosen")}
+        config = self.scene.write_config("curated.json", datasets=[{**sets[0], "curation": "curation/half.csv"}])
+        self.scene.build("curated_out", config=config)
+        rows = verdicts(self.scene.latest("curated_out"))
+        self.assertEqual({row["id"].split("/", 2)[2].split("#")[0] for row in rows}, chosen)
+        broken = out / "broken.csv"
+        broken.write_bytes(first.replace(b"_wolf.png,chosen", b"_moon.png,chosen"))
+        config = self.scene.write_config("broken.json", datasets=[{**sets[0], "curation": "curation/broken.csv"}])
+        self.assertIn("Run `quadruped3d curate` again",
+                      self.scene.build("broken_out", config=config, expect=2).stderr)
+
     # --- explain
 
     def test_errors_of_keypoints_make_up_the_error(self):
