@@ -41,15 +41,14 @@ class Groups {
 
 }  // namespace
 
-HashIndex::HashIndex(std::vector<std::uint64_t> hashes, int max_distance)
-    : hashes_(std::move(hashes)), max_distance_(max_distance) {
+HashIndex::HashIndex(std::span<const std::uint64_t> hashes, int max_distance)
+    : size_(hashes.size()), max_distance_(max_distance) {
   if (max_distance < 0 || max_distance > kMaxHashDistance) {
     throw std::invalid_argument("hash distance: got " + std::to_string(max_distance) + ", expected 0 to " +
                                 std::to_string(kMaxHashDistance));
   }
-  if (hashes_.size() >= std::numeric_limits<std::uint32_t>::max()) {
-    throw std::invalid_argument("hashes: got " + std::to_string(hashes_.size()) +
-                                ", expected less than 2^32");
+  if (hashes.size() >= std::numeric_limits<std::uint32_t>::max()) {
+    throw std::invalid_argument("hashes: got " + std::to_string(hashes.size()) + ", expected less than 2^32");
   }
   for (std::size_t value = 0; value < kBandValues; ++value) {
     if (std::popcount(value) <= max_distance / 4) near_values_.push_back(static_cast<std::uint16_t>(value));
@@ -57,11 +56,16 @@ HashIndex::HashIndex(std::vector<std::uint64_t> hashes, int max_distance)
   for (std::size_t b = 0; b < bands_.size(); ++b) {
     Band& band = bands_[b];
     band.starts.assign(kBandValues + 1, 0);
-    for (const std::uint64_t hash : hashes_) ++band.starts[band_value(hash, b) + 1U];
+    for (const std::uint64_t hash : hashes) ++band.starts[band_value(hash, b) + 1U];
     std::partial_sum(band.starts.begin(), band.starts.end(), band.starts.begin());
     std::vector<std::uint32_t> next(band.starts.begin(), band.starts.end() - 1);
-    band.positions.resize(hashes_.size());
-    for (std::uint32_t i = 0; i < hashes_.size(); ++i) band.positions[next[band_value(hashes_[i], b)]++] = i;
+    band.positions.resize(hashes.size());
+    band.hashes.resize(hashes.size());
+    for (std::uint32_t i = 0; i < hashes.size(); ++i) {
+      const std::uint32_t place = next[band_value(hashes[i], b)]++;
+      band.positions[place] = i;
+      band.hashes[place] = hashes[i];
+    }
   }
 }
 
@@ -74,8 +78,7 @@ void HashIndex::search(std::uint64_t hash, std::vector<Match>& matches) const {
     for (const std::uint16_t difference : near_values_) {
       const auto wanted = static_cast<std::uint16_t>(value ^ difference);
       for (std::uint32_t i = band.starts[wanted]; i < band.starts[wanted + 1U]; ++i) {
-        const std::uint32_t position = band.positions[i];
-        const std::uint64_t differing = hash ^ hashes_[position];
+        const std::uint64_t differing = hash ^ band.hashes[i];
         const int distance = std::popcount(differing);
         if (distance > max_distance_) continue;
         // It is reported from the first band that is near, and from no other.
@@ -83,7 +86,7 @@ void HashIndex::search(std::uint64_t hash, std::vector<Match>& matches) const {
         for (std::size_t earlier = 0; earlier < b && !reported; ++earlier) {
           reported = std::popcount(band_value(differing, earlier)) <= near;
         }
-        if (!reported) matches.push_back({position, distance});
+        if (!reported) matches.push_back({band.positions[i], distance});
       }
     }
   }

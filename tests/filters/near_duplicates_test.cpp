@@ -48,14 +48,14 @@ TEST(HashIndex, finds_all_within_the_distance_and_each_once) {
 
 TEST(HashIndex, an_empty_one_finds_nothing_and_far_distances_are_refused) {
   std::vector<HashIndex::Match> matches(3);
-  HashIndex({}, 6).search(5, matches);
+  HashIndex(std::vector<std::uint64_t>{}, 6).search(5, matches);
   EXPECT_TRUE(matches.empty());
-  EXPECT_THROW(HashIndex({1}, 16), std::invalid_argument);
-  EXPECT_THROW(HashIndex({1}, -1), std::invalid_argument);
+  EXPECT_THROW(HashIndex(std::vector<std::uint64_t>{1}, 16), std::invalid_argument);
+  EXPECT_THROW(HashIndex(std::vector<std::uint64_t>{1}, -1), std::invalid_argument);
 }
 
 TEST(NearestLikeness, takes_the_nearest_then_the_upright_then_the_first) {
-  const HashIndex references({0xF0F0, 0xF0F1, 0xF0F1, 0x0F0F0000}, 4);
+  const HashIndex references(std::vector<std::uint64_t>{0xF0F0, 0xF0F1, 0xF0F1, 0x0F0F0000}, 4);
   const std::uint64_t far = 0xFFFFFFFFFFFFFFFF;
   const auto equal = nearest_likeness(references, {0xF0F1, far});  // to 1 and 2; one bit from 0
   ASSERT_TRUE(equal);
