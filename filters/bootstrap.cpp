@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <random>
 #include <stdexcept>
 #include <string>
@@ -10,19 +11,15 @@ namespace q3d::filters {
 namespace {
 
 [[noreturn]] void refuse(const std::string& what) {
-  throw std::invalid_argument("paired_bootstrap: " + what);
+  throw std::invalid_argument("bootstrap: " + what);
 }
 
-void check(std::span<const double> differences, std::span<const std::size_t> picture_of_item,
+void check(std::span<const double> values, std::span<const std::size_t> picture_of_item,
            const BootstrapOptions& options) {
   const std::size_t items = picture_of_item.size();
-  if (items == 0 || differences.empty() || differences.size() % items != 0) {
-    refuse("got " + std::to_string(differences.size()) + " differences of " + std::to_string(items) +
+  if (items == 0 || values.empty() || values.size() % items != 0) {
+    refuse("got " + std::to_string(values.size()) + " values of " + std::to_string(items) +
            " items, expected runs x items, both 1 or more");
-  }
-  if (!std::all_of(differences.begin(), differences.end(),
-                   [](double value) { return std::isfinite(value); })) {
-    refuse("a difference is not finite");
   }
   if (options.resamples < 1 || !(options.confidence > 0.0 && options.confidence < 1.0)) {
     refuse("resamples must be 1 or more and confidence between 0 and 1, got " +
@@ -30,32 +27,61 @@ void check(std::span<const double> differences, std::span<const std::size_t> pic
   }
 }
 
-// Sums over the items of each picture: all that a resample's mean depends on.
-struct Pictures {
-  std::vector<double> sums;    // pictures x runs
-  std::vector<double> counts;  // items of each picture
-  std::size_t runs = 0;
-  std::size_t count() const { return counts.size(); }
-};
-
-Pictures gather(std::span<const double> differences, std::span<const std::size_t> picture_of_item) {
-  Pictures pictures;
-  const std::size_t items = picture_of_item.size();
-  pictures.runs = differences.size() / items;
-  pictures.counts.assign(1 + *std::max_element(picture_of_item.begin(), picture_of_item.end()), 0.0);
-  if (pictures.count() > items) refuse("the pictures' numbers have gaps");
-  pictures.sums.assign(pictures.count() * pictures.runs, 0.0);
-  for (std::size_t i = 0; i < items; ++i) {
-    pictures.counts[picture_of_item[i]] += 1.0;
-    for (std::size_t r = 0; r < pictures.runs; ++r) {
-      pictures.sums[picture_of_item[i] * pictures.runs + r] += differences[r * items + i];
-    }
+// How many pictures the items belong to.
+std::size_t count_pictures(std::span<const std::size_t> picture_of_item) {
+  std::vector<bool> occurs(picture_of_item.size(), false);
+  for (const std::size_t picture : picture_of_item) {
+    if (picture >= occurs.size()) refuse("the pictures' numbers have gaps");
+    occurs[picture] = true;
   }
-  if (std::find(pictures.counts.begin(), pictures.counts.end(), 0.0) != pictures.counts.end()) {
-    refuse("the pictures' numbers have gaps");
-  }
+  const std::size_t pictures = 1 + *std::max_element(picture_of_item.begin(), picture_of_item.end());
+  const auto end = occurs.begin() + static_cast<std::ptrdiff_t>(pictures);
+  if (std::find(occurs.begin(), end, false) != end) refuse("the pictures' numbers have gaps");
   return pictures;
 }
+
+// Values of one method: all that a resample's mean depends on.
+class PictureSums {
+ public:
+  // NaN is no member.
+  PictureSums(std::span<const double> values, std::span<const std::size_t> picture_of_item)
+      : pictures_(count_pictures(picture_of_item)), runs_(values.size() / picture_of_item.size()) {
+    sums_.assign(pictures_ * runs_, 0.0);
+    counts_.assign(pictures_ * runs_, 0.0);
+    const std::size_t items = picture_of_item.size();
+    for (std::size_t i = 0; i < items; ++i) {
+      for (std::size_t r = 0; r < runs_; ++r) {
+        const double value = values[r * items + i];
+        if (std::isnan(value)) continue;
+        if (std::isinf(value)) refuse("a value is infinite");
+        sums_[picture_of_item[i] * runs_ + r] += value;
+        counts_[picture_of_item[i] * runs_ + r] += 1.0;
+      }
+    }
+  }
+
+  std::size_t pictures() const { return pictures_; }
+  std::size_t runs() const { return runs_; }
+
+  // The mean of the members of drawn pictures, each as often as its run was drawn; NaN without members.
+  double mean(const std::vector<std::size_t>& drawn_pictures, const std::vector<double>& times_drawn) const {
+    double sum = 0.0;
+    double count = 0.0;
+    for (const std::size_t picture : drawn_pictures) {
+      for (std::size_t r = 0; r < runs_; ++r) {
+        sum += times_drawn[r] * sums_[picture * runs_ + r];
+        count += times_drawn[r] * counts_[picture * runs_ + r];
+      }
+    }
+    return sum / count;
+  }
+
+ private:
+  std::size_t pictures_;
+  std::size_t runs_;
+  std::vector<double> sums_;    // pictures x runs
+  std::vector<double> counts_;  // pictures x runs
+};
 
 // 0 .. count - 1, the same on every machine (the standard's distributions are not). The bias is below
 // count / 2^53.
@@ -63,19 +89,17 @@ std::size_t draw(std::mt19937_64& random, std::size_t count) {
   return static_cast<std::size_t>(static_cast<double>(random() >> 11) * 0x1p-53 * static_cast<double>(count));
 }
 
-double resampled_mean(const Pictures& pictures, std::mt19937_64& random, std::vector<double>& times_drawn) {
-  std::fill(times_drawn.begin(), times_drawn.end(), 0.0);
-  for (std::size_t r = 0; r < pictures.runs; ++r) times_drawn[draw(random, pictures.runs)] += 1.0;
-  double sum = 0.0;
-  double items = 0.0;
-  for (std::size_t p = 0; p < pictures.count(); ++p) {
-    const std::size_t picture = draw(random, pictures.count());
-    items += pictures.counts[picture];
-    for (std::size_t r = 0; r < pictures.runs; ++r) {
-      sum += times_drawn[r] * pictures.sums[picture * pictures.runs + r];
-    }
+// Draws pictures and runs, and hands them to `statistic` until it gives a number.
+template <typename Statistic>
+double resample(std::size_t pictures, std::size_t runs, std::mt19937_64& random, const Statistic& statistic) {
+  for (;;) {
+    std::vector<double> times_drawn(runs, 0.0);
+    for (std::size_t r = 0; r < runs; ++r) times_drawn[draw(random, runs)] += 1.0;
+    std::vector<std::size_t> drawn(pictures);
+    for (std::size_t& picture : drawn) picture = draw(random, pictures);
+    const double value = statistic(drawn, times_drawn);
+    if (!std::isnan(value)) return value;
   }
-  return sum / (items * static_cast<double>(pictures.runs));
 }
 
 // Linear interpolation between order statistics (numpy's default).
@@ -86,23 +110,53 @@ double quantile(const std::vector<double>& sorted, double fraction) {
   return sorted[below] + (at - static_cast<double>(below)) * (sorted[above] - sorted[below]);
 }
 
+template <typename Statistic>
+BootstrapInterval interval(double whole, std::size_t pictures, std::size_t runs,
+                           const BootstrapOptions& options, const Statistic& statistic) {
+  std::mt19937_64 random(options.seed);
+  std::vector<double> values(static_cast<std::size_t>(options.resamples));
+  for (double& value : values) value = resample(pictures, runs, random, statistic);
+  std::sort(values.begin(), values.end());
+  const double tail = (1.0 - options.confidence) / 2.0;
+  return {whole, quantile(values, tail), quantile(values, 1.0 - tail)};
+}
+
 }  // namespace
 
 BootstrapInterval paired_bootstrap(std::span<const double> differences,
                                    std::span<const std::size_t> picture_of_item,
                                    const BootstrapOptions& options) {
   check(differences, picture_of_item, options);
-  const Pictures pictures = gather(differences, picture_of_item);
-  std::mt19937_64 random(options.seed);
-  std::vector<double> means(static_cast<std::size_t>(options.resamples));
-  std::vector<double> times_drawn(pictures.runs);
-  for (double& mean : means) mean = resampled_mean(pictures, random, times_drawn);
-  std::sort(means.begin(), means.end());
-  const double tail = (1.0 - options.confidence) / 2.0;
+  if (!std::all_of(differences.begin(), differences.end(),
+                   [](double value) { return std::isfinite(value); })) {
+    refuse("a difference is not finite");
+  }
+  const PictureSums sums(differences, picture_of_item);
   double total = 0.0;
   for (const double difference : differences) total += difference;
-  return {total / static_cast<double>(differences.size()), quantile(means, tail),
-          quantile(means, 1.0 - tail)};
+  return interval(total / static_cast<double>(differences.size()), sums.pictures(), sums.runs(), options,
+                  [&](const auto& drawn, const auto& times_drawn) { return sums.mean(drawn, times_drawn); });
+}
+
+BootstrapInterval bootstrap_of_sets(std::span<const double> first, std::span<const double> second,
+                                    std::span<const std::size_t> picture_of_item,
+                                    const BootstrapOptions& options) {
+  check(first, picture_of_item, options);
+  check(second, picture_of_item, options);
+  if (first.size() != second.size()) {
+    refuse("got " + std::to_string(first.size()) + " values of the first set and " +
+           std::to_string(second.size()) + " of the second, expected as many of each");
+  }
+  const PictureSums of_first(first, picture_of_item);
+  const PictureSums of_second(second, picture_of_item);
+  const auto difference = [&](const std::vector<std::size_t>& drawn, const std::vector<double>& times_drawn) {
+    return of_second.mean(drawn, times_drawn) - of_first.mean(drawn, times_drawn);
+  };
+  std::vector<std::size_t> all(of_first.pictures());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  const double whole = difference(all, std::vector<double>(of_first.runs(), 1.0));
+  if (std::isnan(whole)) refuse("a set is empty");
+  return interval(whole, of_first.pictures(), of_first.runs(), options, difference);
 }
 
 }  // namespace q3d::filters

@@ -34,4 +34,18 @@ BootstrapInterval paired_bootstrap(std::span<const double> differences,
                                    std::span<const std::size_t> picture_of_item,
                                    const BootstrapOptions& options);
 
+// The same for two methods that choose their items, such as labels that two builds keep: the mean of the
+// second set minus that of the first. first, second: runs x items, row-major, the item's value under either
+// method; NaN where it is not in the set.
+//
+// Pictures and runs are drawn as above, the same for both sets; a resample's difference is that of the two
+// means over all drawn members, so the interval knows that a picture that is easy for one method is easy for
+// the other. It takes the sets as given: what chose them is not repeated. A resample that misses one of the
+// sets altogether is drawn again.
+//
+// Throws std::invalid_argument as paired_bootstrap does, for infinite values, and when a set is empty.
+BootstrapInterval bootstrap_of_sets(std::span<const double> first, std::span<const double> second,
+                                    std::span<const std::size_t> picture_of_item,
+                                    const BootstrapOptions& options);
+
 }  // namespace q3d::filters

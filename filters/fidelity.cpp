@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <optional>
 #include <stdexcept>
 
 namespace q3d::filters {
@@ -43,6 +45,31 @@ double gain_within(std::span<const double> curve, int window) {
   }
   if (std::isinf(least)) return std::numeric_limits<double>::quiet_NaN();
   return curve[0] > 0 ? (curve[0] - least) / curve[0] : 0.0;
+}
+
+std::optional<Judgement> find_failure(std::span<const double> curve) {
+  if (curve.empty()) return not_finite("no iterate was measured");
+  if (!std::isfinite(curve[0])) return not_finite("L_proj of the prediction is not finite");
+  return std::nullopt;
+}
+
+// Of a sample whose iterate `kept` would be its label.
+Judgement judge_iterate(std::span<const double> curve, std::size_t kept, const Thresholds& thresholds) {
+  Judgement judgement;
+  judgement.initial_error = curve[0];
+  judgement.final_error = curve[kept];
+  judgement.gain = gain_within(curve, thresholds.gain_window);
+  judgement.iterations = static_cast<int>(curve.size()) - 1;
+  judgement.best_iteration = static_cast<int>(kept);
+  if (curve[kept] < thresholds.tau_low || judgement.gain >= thresholds.delta) {
+    judgement.verdict = Verdict::refined;
+    return judgement;
+  }
+  judgement.verdict = Verdict::discarded;
+  judgement.reason = Reason::gain_too_small;
+  judgement.detail = fmt::format("gain {:.4g} within {} iterations, delta {:.4g}", judgement.gain,
+                                 thresholds.gain_window, thresholds.delta);
+  return judgement;
 }
 
 }  // namespace
@@ -97,23 +124,25 @@ Judgement judge_initial(double initial_error, const Thresholds& thresholds) {
 }
 
 Judgement judge_adapted(std::span<const double> curve, const Thresholds& thresholds) {
-  if (curve.empty()) return not_finite("no iterate was measured");
-  if (!std::isfinite(curve[0])) return not_finite("L_proj of the prediction is not finite");
-  const std::size_t best = best_iterate(curve);
-  Judgement judgement;
-  judgement.initial_error = curve[0];
-  judgement.final_error = curve[best];
-  judgement.gain = gain_within(curve, thresholds.gain_window);
-  judgement.iterations = static_cast<int>(curve.size()) - 1;
-  judgement.best_iteration = static_cast<int>(best);
-  if (curve[best] < thresholds.tau_low || judgement.gain >= thresholds.delta) {
-    judgement.verdict = Verdict::refined;
-    return judgement;
+  if (const auto failure = find_failure(curve)) return *failure;
+  return judge_iterate(curve, best_iterate(curve), thresholds);
+}
+
+Judgement judge_held_out(std::span<const double> curve, std::span<const double> held_out,
+                         const Thresholds& thresholds) {
+  if (held_out.size() != curve.size()) {
+    throw std::invalid_argument(
+        fmt::format("judge_held_out: got {} held-out errors of {} iterates", held_out.size(), curve.size()));
   }
-  judgement.verdict = Verdict::discarded;
-  judgement.reason = Reason::gain_too_small;
-  judgement.detail = fmt::format("gain {:.4g} within {} iterations, delta {:.4g}", judgement.gain,
-                                 thresholds.gain_window, thresholds.delta);
+  if (const auto failure = find_failure(curve)) return *failure;
+  if (const auto failure = find_failure(held_out)) return *failure;
+  const std::size_t best = best_iterate(held_out);
+  Judgement judgement = judge_iterate(curve, best, thresholds);
+  if (judgement.verdict == Verdict::refined && best == 0) {
+    judgement.verdict = Verdict::discarded;
+    judgement.reason = Reason::held_out_not_better;
+    judgement.detail = fmt::format("no iterate brings the held-out keypoints below {:.4g}", held_out[0]);
+  }
   return judgement;
 }
 

@@ -39,4 +39,13 @@ manifests::Judgement judge_initial(double initial_error, const Thresholds& thres
 // not finite are passed over; a curve that is empty or starts with one is a failure (prediction_not_finite).
 manifests::Judgement judge_adapted(std::span<const double> curve, const Thresholds& thresholds);
 
+// The same of a sample that adaptation did not see whole: `held_out` is the error of the keypoints that were
+// kept from it, of the same iterates as `curve`, which is of all visible keypoints. The kept iterate is the
+// first of least held-out error. It is asked for more than the paper's rule: the iterate that is to be below
+// tau_low is the kept one, and it must not be the prediction itself (held_out_not_better), since what does
+// not help the points it has not seen is no better body. Throws std::invalid_argument when the lengths
+// differ.
+manifests::Judgement judge_held_out(std::span<const double> curve, std::span<const double> held_out,
+                                    const Thresholds& thresholds);
+
 }  // namespace q3d::filters

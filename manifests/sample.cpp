@@ -10,7 +10,7 @@ constexpr std::array<std::string_view, 6> kFamilyNames{"none",    "felidae", "ca
                                                        "equidae", "bovidae", "hippopotamidae"};
 static_assert(kFamilyNames.size() == static_cast<std::size_t>(Family::hippopotamidae) + 2);
 
-constexpr std::array<std::string_view, 24> kReasonNames{
+constexpr std::array<std::string_view, 31> kReasonNames{
     "none",
     "box_missing",
     "box_not_finite",
@@ -34,6 +34,13 @@ constexpr std::array<std::string_view, 24> kReasonNames{
     "prediction_not_finite",
     "error_too_large",
     "gain_too_small",
+    "too_few_keypoints",
+    "scaled_gain_too_small",
+    "held_out_not_better",
+    "pose_implausible",
+    "limbs_implausible",
+    "left_right_swapped",
+    "mask_mismatch",
     "vetoed",
 };
 static_assert(kReasonNames.size() == static_cast<std::size_t>(Reason::vetoed) + 1);

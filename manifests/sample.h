@@ -79,6 +79,14 @@ enum class Reason : std::uint8_t {
   // discarded by the fidelity rule
   error_too_large,  // L_proj >= tau_high
   gain_too_small,   // relative gain < delta within the first ten iterations
+  // discarded by a guard (filters/guards.h)
+  too_few_keypoints,      // fewer visible keypoints than visible_min
+  scaled_gain_too_small,  // gain < delta within the fewer iterations that few visible keypoints allow
+  held_out_not_better,    // adaptation brings the held-out keypoints no closer
+  pose_implausible,       // the pose is too far from the prior
+  limbs_implausible,      // a limb's length is too far from those of the families
+  left_right_swapped,     // the label fits the annotation better with left and right exchanged
+  mask_mismatch,          // the body's silhouette covers too little of the mask, or too much beside it
   // discarded by the user
   vetoed,
 };

@@ -27,34 +27,62 @@ DecoderOutput unpack(const torch::Tensor& rows) {
           parts[4].unflatten(1, {kKeypoints, 3})};
 }
 
-// |prediction - target| averaged over visible keypoints and both coordinates: (B).
-torch::Tensor mean_absolute_error(const torch::Tensor& prediction, const KeypointTargets& targets) {
-  const torch::Tensor error = (prediction - targets.xy).abs() * targets.visible;
-  return error.sum({1, 2}) / (2.0 * targets.count.clamp_min(1.0));
+// |prediction - target| averaged over the keypoints of a mask (B, 26, 1) and both coordinates: (B).
+torch::Tensor mean_absolute_error(const torch::Tensor& prediction, const KeypointTargets& targets,
+                                  const torch::Tensor& mask) {
+  const torch::Tensor error = (prediction - targets.xy).abs() * mask;
+  return error.sum({1, 2}) / (2.0 * mask.sum({1, 2}).clamp_min(1.0));
 }
 
 torch::Tensor objective(const TtaOptions& options, const torch::Tensor& projected, const torch::Tensor& aux,
                         const KeypointTargets& targets) {
   if (options.objective == TtaObjective::demo) {
-    const torch::Tensor error = (projected - targets.xy).square() * targets.visible;
-    return error.sum({1, 2}) / (targets.count + 1e-6);
+    const torch::Tensor error = (projected - targets.xy).square() * targets.fitted;
+    return error.sum({1, 2}) / (targets.fitted.sum({1, 2}) + 1e-6);
   }
-  return options.aux_weight * mean_absolute_error(aux, targets) +
-         options.reproj_weight * mean_absolute_error(projected, targets);
+  return options.aux_weight * mean_absolute_error(aux, targets, targets.fitted) +
+         options.reproj_weight * mean_absolute_error(projected, targets, targets.fitted);
 }
 
-KeypointTargets make_targets(const torch::Tensor& keypoints, torch::Device device) {
+KeypointTargets make_targets(const torch::Tensor& keypoints, const std::vector<TtaSchedule>& schedules,
+                             torch::Device device) {
+  torch::Tensor held_out = torch::zeros({keypoints.size(0), kKeypoints, 1}, torch::kFloat32);
+  for (std::size_t i = 0; i < schedules.size(); ++i) {
+    for (std::size_t k = 0; k < schedules[i].held_out.size(); ++k) {
+      if (!schedules[i].held_out[k]) continue;
+      held_out[static_cast<std::int64_t>(i)][static_cast<std::int64_t>(k)].fill_(1.0);
+    }
+  }
   const torch::Tensor numbers = keypoints.to(device).to(torch::kFloat32);
   const torch::Tensor visible = numbers.narrow(2, 2, 1) > 0.0;
   KeypointTargets targets;
   targets.xy = torch::where(visible, numbers.narrow(2, 0, 2), torch::zeros({}, numbers.options()));
   targets.visible = visible.to(torch::kFloat32);
-  targets.count = targets.visible.sum({1, 2});
+  targets.held_out = held_out.to(device) * targets.visible;
+  targets.fitted = targets.visible - targets.held_out;
   return targets;
 }
 
 void require(bool holds, const std::string& message) {
   if (!holds) throw std::invalid_argument("adapt: " + message);
+}
+
+void check_held_out(const torch::Tensor& keypoints, const std::vector<TtaSchedule>& schedules) {
+  const torch::Tensor weights = keypoints.select(2, 2).to(torch::kCPU, torch::kFloat64).contiguous();
+  const auto weight = weights.accessor<double, 2>();
+  for (std::size_t i = 0; i < schedules.size(); ++i) {
+    const TtaSchedule& schedule = schedules[i];
+    require(schedule.patience >= 0, fmt::format("a schedule with a patience of {}", schedule.patience));
+    if (schedule.held_out.none()) continue;
+    int fitted = 0;
+    for (std::size_t k = 0; k < schedule.held_out.size(); ++k) {
+      const bool visible = weight[static_cast<std::int64_t>(i)][static_cast<std::int64_t>(k)] > 0.0;
+      require(visible || !schedule.held_out[k],
+              fmt::format("instance {}: keypoint {} is held out and not visible", i, k));
+      fitted += visible && !schedule.held_out[k] ? 1 : 0;
+    }
+    require(fitted > 0, fmt::format("instance {}: all visible keypoints are held out", i));
+  }
 }
 
 void check_arguments(const Prima& prima, const ImageFeatures& features, const torch::Tensor& keypoints,
@@ -74,6 +102,7 @@ void check_arguments(const Prima& prima, const ImageFeatures& features, const to
             fmt::format("a schedule with {} iterations and a gain window of {}", schedule.iterations,
                         schedule.gain_window));
   }
+  check_held_out(keypoints, schedules);
   require(std::isfinite(options.learning_rate) && options.learning_rate >= 0.0,
           fmt::format("learning rate {}", options.learning_rate));
   require(std::is_sorted(options.snapshots.begin(), options.snapshots.end()) &&
@@ -87,9 +116,11 @@ double relative_gain(const std::vector<double>& l_proj) {
   return l_proj.front() > 0.0 ? (l_proj.front() - least) / l_proj.front() : 0.0;
 }
 
-bool wants_to_stop(const TtaSchedule& schedule, const std::vector<double>& l_proj) {
+// `best`: the best iterate so far.
+bool wants_to_stop(const TtaSchedule& schedule, const std::vector<double>& l_proj, int best) {
   const int taken = static_cast<int>(l_proj.size()) - 1;
   if (taken >= schedule.iterations) return true;
+  if (schedule.held_out.any() && schedule.patience > 0 && taken - best >= schedule.patience) return true;
   if (schedule.stop_below > 0.0 && l_proj.back() < schedule.stop_below) return true;
   return schedule.min_gain > 0.0 && taken == schedule.gain_window &&
          relative_gain(l_proj) < schedule.min_gain;
@@ -97,10 +128,11 @@ bool wants_to_stop(const TtaSchedule& schedule, const std::vector<double>& l_pro
 
 // The active instances at one iterate.
 struct Iterate {
-  torch::Tensor rows;    // (n, 384) packed decoder outputs
-  torch::Tensor loss;    // (n), with its graph
-  torch::Tensor l_proj;  // (n)
-  torch::Tensor usable;  // (n) bool: all numbers finite and something visible to measure by
+  torch::Tensor rows;      // (n, 384) packed decoder outputs
+  torch::Tensor loss;      // (n), with its graph
+  torch::Tensor l_proj;    // (n)
+  torch::Tensor held_out;  // (n) error of the held-out keypoints; 0 of an instance without any
+  torch::Tensor usable;    // (n) bool: all numbers finite and something visible to measure by
 };
 
 class Adaptation {
@@ -110,10 +142,13 @@ class Adaptation {
       : prima_(prima),
         schedules_(schedules),
         options_(options),
+        holds_out_(std::any_of(schedules.begin(), schedules.end(),
+                               [](const TtaSchedule& schedule) { return schedule.held_out.any(); })),
         initial_betas_(decoder().initial_betas(features.bio_token)),
         slots_(decoder().own_parameters(), decoder().remember(features.image_tokens), initial_betas_.clone(),
-               make_targets(keypoints, prima.device())) {
+               make_targets(keypoints, schedules, prima.device())) {
     result_.l_proj.resize(schedules.size());
+    result_.held_out.resize(schedules.size());
     result_.loss.resize(schedules.size());
     result_.best_iteration.resize(schedules.size(), 0);
   }
@@ -179,34 +214,40 @@ class Adaptation {
     Iterate iterate;
     iterate.loss = objective(options_, projected, output.aux_keypoints_2d, targets);
     const torch::NoGradGuard no_grad;
-    iterate.l_proj = mean_absolute_error(projected, targets);
+    iterate.l_proj = mean_absolute_error(projected, targets, targets.visible);
+    iterate.held_out = holds_out_ ? mean_absolute_error(projected, targets, targets.held_out)
+                                  : torch::zeros_like(iterate.l_proj);
     iterate.rows = pack(output).detach();
     iterate.usable = iterate.rows.isfinite().all(1) & projected.flatten(1).isfinite().all(1) &
-                     iterate.loss.isfinite() & iterate.l_proj.isfinite() & (targets.count > 0.0);
+                     iterate.loss.isfinite() & iterate.l_proj.isfinite() &
+                     (targets.visible.sum({1, 2}) > 0.0);
     return iterate;
   }
 
   // Notes the iterate in the results -> per slot, whether the instance goes on.
   std::vector<bool> record(const Iterate& iterate) {
-    const torch::Tensor numbers =
-        torch::stack({iterate.loss.detach(), iterate.l_proj, iterate.usable.to(torch::kFloat32)})
-            .to(torch::kCPU, torch::kFloat64);
+    const torch::Tensor numbers = torch::stack({iterate.loss.detach(), iterate.l_proj,
+                                                iterate.usable.to(torch::kFloat32), iterate.held_out})
+                                      .to(torch::kCPU, torch::kFloat64);
     const auto rows = numbers.accessor<double, 2>();
     std::vector<std::int64_t> accepted, improved;
     std::vector<bool> goes_on(static_cast<std::size_t>(slots_.size()), false);
     for (std::int64_t slot = 0; slot < slots_.size(); ++slot) {
       if (rows[2][slot] == 0.0) continue;
       const auto instance = static_cast<std::size_t>(slots_.instance(slot));
-      std::vector<double>& l_proj = result_.l_proj[instance];
-      result_.loss[instance].push_back(rows[0][slot]);
       accepted.push_back(slot);
-      if (l_proj.empty() ||
-          rows[1][slot] < l_proj[static_cast<std::size_t>(result_.best_iteration[instance])]) {
+      result_.loss[instance].push_back(rows[0][slot]);
+      result_.l_proj[instance].push_back(rows[1][slot]);
+      const bool holds_out = schedules_[instance].held_out.any();
+      if (holds_out) result_.held_out[instance].push_back(rows[3][slot]);
+      const std::vector<double>& judged = holds_out ? result_.held_out[instance] : result_.l_proj[instance];
+      int& best = result_.best_iteration[instance];
+      if (taken_ == 0 || judged.back() < judged[static_cast<std::size_t>(best)]) {
         improved.push_back(slot);
-        result_.best_iteration[instance] = taken_;
+        best = taken_;
       }
-      l_proj.push_back(rows[1][slot]);
-      goes_on[static_cast<std::size_t>(slot)] = !wants_to_stop(schedules_[instance], l_proj);
+      goes_on[static_cast<std::size_t>(slot)] =
+          !wants_to_stop(schedules_[instance], result_.l_proj[instance], best);
     }
     if (taken_ == 0) {  // slots are still in the order of instances; unusable ones have nothing better
       best_ = iterate.rows.clone();
@@ -231,6 +272,7 @@ class Adaptation {
   const Prima& prima_;
   const std::vector<TtaSchedule>& schedules_;
   const TtaOptions& options_;
+  bool holds_out_;               // any instance does
   torch::Tensor initial_betas_;  // (B, 41)
   TtaSlots slots_;
   torch::Tensor best_, last_;             // (B, 384) packed outputs

@@ -6,8 +6,10 @@
 
 #include <torch/torch.h>
 
+#include <bitset>
 #include <vector>
 
+#include "model/decoder.h"
 #include "model/prima.h"
 
 namespace q3d::model {
@@ -32,18 +34,24 @@ struct TtaSchedule {
   double stop_below = 0.0;  // stop as soon as L_proj is below this (tau_low); 0 = never
   double min_gain = 0.0;  // give up after `gain_window` iterations when the relative gain is less; 0 = never
   int gain_window = 10;
+  // Visible keypoints that the objective does not see; the others must not all be among them. Where there are
+  // any, the best iterate is the one of least error on them.
+  std::bitset<static_cast<std::size_t>(kKeypoints)> held_out;
+  int patience = 0;  // stop after so many iterations without a new least held-out error; 0 = never
 };
 
 // L_proj: mean over visible keypoints and both coordinates of |projected - annotated|.
 struct TtaResult {
-  Prediction best;  // the iterate of least L_proj, iteration 0 included
+  Prediction best;  // the iterate of least L_proj, or of least held-out error; iteration 0 included
   Prediction last;  // the iterate after the last step taken
   // One for each of options.snapshots; an instance that stopped before shows its last iterate.
   std::vector<Prediction> snapshots;
   // An instance's curves are empty where nothing could be measured: no visible keypoint, or a target or a
   // first prediction that is not finite.
   std::vector<std::vector<double>> l_proj;  // per instance: L_proj of iterates 0..n in crop units
-  std::vector<std::vector<double>> loss;    // per instance: the objective at iterates 0..n
+  // Likewise of the held-out keypoints alone (l_proj is of all visible ones); empty where none is held out.
+  std::vector<std::vector<double>> held_out;
+  std::vector<std::vector<double>> loss;  // per instance: the objective at iterates 0..n
   std::vector<int> best_iteration;
 };
 

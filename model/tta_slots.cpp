@@ -69,7 +69,7 @@ torch::Tensor TtaSlots::initial_betas() const {
 }
 
 KeypointTargets TtaSlots::targets() const {
-  return {active(targets_.xy), active(targets_.visible), active(targets_.count)};
+  return {active(targets_.xy), active(targets_.visible), active(targets_.held_out), active(targets_.fitted)};
 }
 
 void TtaSlots::step(const std::vector<torch::Tensor>& gradients, double learning_rate) {
@@ -95,7 +95,8 @@ void TtaSlots::remove(std::int64_t slot) {
   for (const auto* group : {&parameters_, &first_moments_, &second_moments_, &memory_.keys_values}) {
     for (const auto& rows : *group) move_row(rows);
   }
-  for (const auto& rows : {memory_.sampled, initial_betas_, targets_.xy, targets_.visible, targets_.count}) {
+  for (const auto& rows :
+       {memory_.sampled, initial_betas_, targets_.xy, targets_.visible, targets_.held_out, targets_.fitted}) {
     move_row(rows);
   }
   instances_[static_cast<std::size_t>(slot)] = instances_.back();

@@ -9,11 +9,13 @@
 
 namespace q3d::model {
 
-// x, y (B, 26, 2) crop units, zero where invisible; visible (B, 26, 1) of 0 and 1; count (B) of visible ones.
+// x, y (B, 26, 2) crop units, zero where invisible. Masks (B, 26, 1) of 0 and 1: the visible ones, those of
+// them that are held out, and the others, which the objective fits.
 struct KeypointTargets {
   torch::Tensor xy;
   torch::Tensor visible;
-  torch::Tensor count;
+  torch::Tensor held_out;
+  torch::Tensor fitted;
 };
 
 class TtaSlots {

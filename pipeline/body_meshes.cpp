@@ -4,8 +4,11 @@
 
 #include <algorithm>
 
+#include "model/device.h"
+#include "model/priors.h"
 #include "smal/body.h"
 #include "smal/rotation.h"
+#include "smal/safetensors.h"
 
 namespace q3d::pipeline {
 namespace {
@@ -15,15 +18,19 @@ constexpr std::size_t kBatch = 32;  // bounds the memory of skinning to some 20 
 std::vector<BodyMesh> to_meshes(const smal::BodyOutput& output) {
   const torch::Tensor vertices = output.vertices.contiguous();
   const torch::Tensor keypoints = output.keypoints.contiguous();
+  const torch::Tensor joints = output.joints.contiguous();
   const std::int64_t numbers = vertices[0].numel();
   std::vector<BodyMesh> meshes(static_cast<std::size_t>(vertices.size(0)));
   const float* vertex = vertices.data_ptr<float>();
   const float* keypoint = keypoints.data_ptr<float>();
+  const float* joint = joints.data_ptr<float>();
   for (BodyMesh& mesh : meshes) {
     mesh.vertices.assign(vertex, vertex + numbers);
     std::copy_n(keypoint, mesh.keypoints_3d.size(), mesh.keypoints_3d.begin());
+    std::copy_n(joint, mesh.joints.size(), mesh.joints.begin());
     vertex += numbers;
     keypoint += mesh.keypoints_3d.size();
+    joint += mesh.joints.size();
   }
   return meshes;
 }
@@ -44,9 +51,39 @@ struct BodyMeshes::Impl {
   smal::SmalBody body;
 };
 
-BodyMeshes::BodyMeshes(const std::filesystem::path& smal_asset)
-    : impl_(new Impl{smal::SmalBody(smal::load_asset(smal_asset))}) {}
+BodyMeshes::BodyMeshes(const std::filesystem::path& smal_asset, int compute_threads)
+    : impl_(new Impl{smal::SmalBody(smal::load_asset(smal_asset))}) {
+  if (compute_threads > 0) model::configure_compute(compute_threads);
+}
 BodyMeshes::~BodyMeshes() = default;
+
+std::vector<std::array<std::int32_t, 3>> BodyMeshes::faces() const {
+  const torch::Tensor faces = impl_->body.asset().faces.to(torch::kInt32).contiguous();
+  std::vector<std::array<std::int32_t, 3>> triangles(static_cast<std::size_t>(faces.size(0)));
+  const std::int32_t* corner = faces.data_ptr<std::int32_t>();
+  for (auto& triangle : triangles) {
+    std::copy_n(corner, 3, triangle.begin());
+    corner += 3;
+  }
+  return triangles;
+}
+
+PriorNumbers read_priors(const std::filesystem::path& path) {
+  const model::Priors priors = model::load_priors(smal::SafeTensors::open(path), torch::kCPU);
+  const auto numbers = [](const torch::Tensor& tensor) {
+    const torch::Tensor wide = tensor.to(torch::kFloat64).contiguous();
+    return std::vector<double>(wide.data_ptr<double>(), wide.data_ptr<double>() + wide.numel());
+  };
+  PriorNumbers result{{numbers(priors.mean_pose), numbers(priors.precs), numbers(priors.use_index)}, {}};
+  const torch::Tensor betas = priors.mean_betas.contiguous();
+  result.family_betas.resize(static_cast<std::size_t>(betas.size(0)));
+  const float* number = betas.data_ptr<float>();
+  for (auto& family : result.family_betas) {
+    std::copy_n(number, family.size(), family.begin());
+    number += family.size();
+  }
+  return result;
+}
 
 std::vector<BodyMesh> BodyMeshes::pose(std::span<const BodyShape> bodies) const {
   const torch::NoGradGuard no_gradients;

@@ -2,8 +2,10 @@
 
 #include <chrono>
 #include <memory>
+#include <optional>
 
 #include "manifests/shard.h"
+#include "pipeline/label_measurer.h"
 #include "pipeline/progress.h"
 #include "pipeline/publish.h"
 #include "pipeline/shard_assembly.h"
@@ -19,10 +21,10 @@ namespace {
 // Takes every unit through the stages, using what earlier runs left in the stages' folders.
 class UnitBuilder {
  public:
-  UnitBuilder(const BuildConfig& config, const filters::Thresholds& thresholds, const StageKeys& keys,
+  UnitBuilder(const BuildConfig& config, const JudgingRules& rules, const StageKeys& keys,
               Workspace& workspace)
       : config_(config),
-        thresholds_(thresholds),
+        rules_(rules),
         keys_(keys),
         workspace_(workspace),
         predictions_(workspace.out(), "predict", keys.predict),
@@ -30,13 +32,18 @@ class UnitBuilder {
         shards_(workspace.out(), "shards", keys.shards),
         judgements_(workspace.ingest().candidates.size()),
         progress_("candidates", static_cast<std::int64_t>(workspace.ingest().candidates.size()),
-                  workspace.quiet()) {}
+                  workspace.quiet()) {
+    if (!keys.measure.empty()) measurements_.emplace(workspace.out(), "measure", keys.measure);
+  }
 
   void run() {
+    if (measurements_) {  // before any work, so that missing priors are told at once
+      workspace_.device().run([this] { measurer_ = std::make_unique<LabelMeasurer>(config_); });
+    }
     UnitFlow flow;
     flow.units = static_cast<std::int64_t>(workspace_.ingest().units.size());
     flow.read = [this](std::int64_t index) { return read(index); };
-    flow.decode = [this](UnitWork& work) { decode_unit(work, config_.shards, &thresholds_); };
+    flow.decode = [this](UnitWork& work) { decode_unit(work, config_.shards, &rules_); };
     flow.compute = [this](UnitWork& work) { compute(work); };
     flow.write = [this](UnitWork& work) { write(work); };
     pipeline::run(flow, workspace_.device());
@@ -53,10 +60,14 @@ class UnitBuilder {
     work->candidates = std::span(ingest.candidates).subspan(work->unit->first, work->unit->count);
     if (const auto table = predictions_.load(*work->unit)) work->predicted = predicted_from_table(*table);
     if (const auto table = refinements_.load(*work->unit)) work->refined = refined_from_table(*table);
+    if (measurements_) {
+      if (const auto table = measurements_->load(*work->unit)) work->measured = measured_from_table(*table);
+    }
     work->predicted_before = work->predicted.has_value();
     work->refined_before = work->refined.has_value();
+    work->measured_before = work->measured.has_value();
     work->shard_before = shards_.has(*work->unit);
-    if (work->predicted) judge_unit(*work, thresholds_);
+    if (work->predicted) judge_unit(*work, rules_);
     return work;
   }
 
@@ -64,10 +75,14 @@ class UnitBuilder {
   void compute(UnitWork& work) {
     const NetworkSource network = [this]() -> Network& { return workspace_.network(); };
     if (!work.predicted) predict_unit(work, network);
-    judge_unit(work, thresholds_);
+    judge_unit(work, rules_);
     if (!work.refined) {
-      refine_unit(work, network, thresholds_);
-      judge_unit(work, thresholds_);
+      refine_unit(work, network, rules_);
+      judge_unit(work, rules_);
+    }
+    if (measurements_ && !work.measured) {
+      work.measured = measurer_->measure(work);
+      judge_unit(work, rules_);
     }
   }
 
@@ -75,6 +90,7 @@ class UnitBuilder {
     const Unit& unit = *work.unit;
     if (!work.predicted_before) predictions_.save(unit, to_table(*work.predicted));
     if (!work.refined_before) refinements_.save(unit, to_table(*work.refined));
+    if (work.measured && !work.measured_before) measurements_->save(unit, to_table(*work.measured));
     if (!work.shard_before) write_unit_shard(work);
     std::copy(work.judgements.begin(), work.judgements.end(),
               judgements_.begin() + static_cast<std::ptrdiff_t>(unit.first));
@@ -94,12 +110,14 @@ class UnitBuilder {
   }
 
   const BuildConfig& config_;
-  const filters::Thresholds& thresholds_;
+  const JudgingRules& rules_;
   const StageKeys& keys_;
   Workspace& workspace_;
   StageStore predictions_;
   StageStore refinements_;
   StageStore shards_;
+  std::optional<StageStore> measurements_;        // where the rules measure labels
+  std::unique_ptr<LabelMeasurer> measurer_;       // made and used on the device's thread
   std::vector<manifests::Judgement> judgements_;  // of every candidate, in ingest order
   Progress progress_;
 };
@@ -108,19 +126,19 @@ class UnitBuilder {
 
 BuildSummary build(const BuildConfig& config, const RunOptions& options) {
   const auto start = std::chrono::steady_clock::now();
-  const filters::Thresholds limits = needs_network(config) ? thresholds(config) : filters::Thresholds{};
+  const JudgingRules rules = judging_rules(config);
   Workspace workspace(config, options);
   const StageKeys keys =
-      stage_keys(config, limits, workspace.ingest(), workspace.assets(), workspace.device_key());
+      stage_keys(config, rules, workspace.ingest(), workspace.assets(), workspace.device_key());
 
   BuildSummary summary;
   summary.folder = version_folder(options.out, config, keys);
   summary.was_up_to_date = is_published(summary.folder, keys);
   if (!summary.was_up_to_date) {
-    UnitBuilder units(config, limits, keys, workspace);
+    UnitBuilder units(config, rules, keys, workspace);
     units.run();
     const DatasetInputs inputs{
-        &config, &limits, &workspace.ingest(), &workspace.assets(), &keys, workspace.device_key()};
+        &config, &rules, &workspace.ingest(), &workspace.assets(), &keys, workspace.device_key()};
     publish(summary.folder, inputs, units.judgements(), units.shards());
   }
   point_latest(options.out, summary.folder);

@@ -8,6 +8,7 @@
 
 #include "pipeline/config_layers.h"
 #include "pipeline/json_fields.h"
+#include "pipeline/profiles.h"
 
 namespace q3d::pipeline {
 namespace {
@@ -85,15 +86,68 @@ void parse_tta(const json& object, const std::string& where, TtaConfig& tta) {
   require(tta.batch >= 1, where, "\"batch\" must be at least 1");
 }
 
-void parse_filter(const json& object, const std::string& where, FilterConfig& filter) {
+void require_both_taus(const std::optional<double>& tau_low, const std::optional<double>& tau_high,
+                       const std::string& where) {
+  require(
+      tau_low.has_value() == tau_high.has_value(), where,
+      "\"tau_low\" and \"tau_high\" belong together: give both, or neither and run `quadruped3d calibrate`");
+}
+
+// `names`: of the config's datasets.
+void parse_dataset_thresholds(const json& object, const std::string& where,
+                              const std::vector<std::string>& names, FilterConfig& filter) {
+  require(object.is_object(), where, "expected a JSON object with a dataset's name for each key");
+  for (const auto& [name, limits] : object.items()) {
+    require_one_of(name, names, where);
+    DatasetThresholds& own = filter.datasets[name];
+    JsonFields fields(limits, where + ": " + name);
+    fields.read("tau_low", own.tau_low);
+    fields.read("tau_high", own.tau_high);
+    fields.read("delta", own.delta);
+    fields.finish();
+    require_both_taus(own.tau_low, own.tau_high, fields.where());
+  }
+}
+
+void parse_filter(const json& object, const std::string& where, const std::vector<std::string>& names,
+                  FilterConfig& filter) {
   JsonFields fields(object, where);
   fields.read("tau_low", filter.tau_low);
   fields.read("tau_high", filter.tau_high);
   fields.read("delta", filter.delta);
+  if (const json* datasets = fields.child("datasets")) {
+    parse_dataset_thresholds(*datasets, where + ": datasets", names, filter);
+  }
   fields.finish();
-  require(
-      filter.tau_low.has_value() == filter.tau_high.has_value(), where,
-      "\"tau_low\" and \"tau_high\" belong together: give both, or neither and run `quadruped3d calibrate`");
+  require_both_taus(filter.tau_low, filter.tau_high, where);
+}
+
+void parse_guards(const json& object, const std::string& where, GuardConfig& guards) {
+  std::string priors;
+  JsonFields fields(object, where);
+  fields.read("visible_min", guards.visible_min);
+  fields.read("iterations_full_at", guards.iterations_full_at);
+  fields.read("held_out_share", guards.held_out_share);
+  fields.read("held_out_seed", guards.held_out_seed);
+  fields.read("held_out_patience", guards.held_out_patience);
+  fields.read("pose_deviation_max", guards.pose_deviation_max);
+  fields.read("limb_factor_max", guards.limb_factor_max);
+  fields.read("left_right_max", guards.left_right_max);
+  fields.read("mask_iou_min", guards.mask_iou_min);
+  fields.read("priors", priors);
+  fields.finish();
+  guards.priors = priors;
+  try {
+    filters::check(guards);
+  } catch (const std::invalid_argument& error) {
+    throw ConfigError(where + ": " + error.what());
+  }
+  require(guards.iterations_full_at >= 0 && guards.iterations_full_at <= manifests::kNumKeypoints, where,
+          fmt::format("\"iterations_full_at\" must be 0 (off) to 26, got {}", guards.iterations_full_at));
+  require(guards.held_out_share >= 0.0 && guards.held_out_share < 1.0, where,
+          fmt::format("\"held_out_share\" must be 0 (off) or more and less than 1, got {}",
+                      guards.held_out_share));
+  require(guards.held_out_patience >= 0, where, "\"held_out_patience\" must be 0 (no limit) or more");
 }
 
 void parse_shards(const json& object, const std::string& where, ShardConfig& shards) {
@@ -112,10 +166,11 @@ void parse_shards(const json& object, const std::string& where, ShardConfig& sha
           "\"crop_min_side_px\" must be 256 to 2048");
 }
 
-void parse_calibrate(const json& object, const std::string& where, filters::TargetShares& shares) {
+void parse_calibrate(const json& object, const std::string& where, CalibrateConfig& shares) {
   JsonFields fields(object, where);
   fields.read("retained", shares.retained);
   fields.read("refined", shares.refined);
+  fields.read("per_dataset", shares.per_dataset);
   fields.finish();
   require(shares.retained > 0 && shares.refined > 0 && shares.retained + shares.refined < 1, where,
           "the shares must be greater than 0 and their sum less than 1");
@@ -126,16 +181,35 @@ void resolve_paths(json& config, const fs::path& folder) {
     resolve_path(config["network"], "checkpoint", folder);
     resolve_path(config["network"], "smal_asset", folder);
   }
+  if (config.contains("guards")) resolve_path(config["guards"], "priors", folder);
   if (config.contains("datasets") && config["datasets"].is_array()) {
     for (auto& dataset : config["datasets"]) resolve_path(dataset, "root", folder);
   }
+}
+
+// The config laid over its profile.
+json expand_profile(const json& merged, const std::string& where) {
+  std::string profile = BuildConfig().profile;
+  JsonFields(merged, where).read("profile", profile);
+  require_one_of(profile, profile_names(), where + ": profile");
+  json expanded = profile_layer(profile);
+  expanded.merge_patch(merged);
+  return expanded;
+}
+
+std::vector<std::string> names_of(const std::vector<DatasetConfig>& datasets) {
+  std::vector<std::string> names;
+  for (const DatasetConfig& dataset : datasets) names.push_back(dataset.name);
+  return names;
 }
 
 }  // namespace
 
 BuildConfig parse_build_config(const json& merged, const std::string& where) {
   BuildConfig config;
-  JsonFields fields(merged, where);
+  const json expanded = expand_profile(merged, where);
+  JsonFields fields(expanded, where);
+  fields.read("profile", config.profile);
   fields.read("name", config.name);
   fields.read("version", config.version);
   if (const json* datasets = fields.child("datasets")) {
@@ -153,7 +227,10 @@ BuildConfig parse_build_config(const json& merged, const std::string& where) {
             "it. Datasets that bring theirs have the role \"truth\" or \"2d_only\"");
   }
   if (const json* tta = fields.child("tta")) parse_tta(*tta, where + ": tta", config.tta);
-  if (const json* filter = fields.child("filter")) parse_filter(*filter, where + ": filter", config.filter);
+  if (const json* filter = fields.child("filter")) {
+    parse_filter(*filter, where + ": filter", names_of(config.datasets), config.filter);
+  }
+  if (const json* guards = fields.child("guards")) parse_guards(*guards, where + ": guards", config.guards);
   if (const json* shards = fields.child("shards")) parse_shards(*shards, where + ": shards", config.shards);
   if (const json* shares = fields.child("calibrate")) {
     parse_calibrate(*shares, where + ": calibrate", config.calibrate);
@@ -183,29 +260,6 @@ BuildConfig load_build_config(const std::vector<fs::path>& files) {
 bool needs_network(const BuildConfig& config) {
   return std::any_of(config.datasets.begin(), config.datasets.end(),
                      [](const DatasetConfig& dataset) { return dataset.role == Role::pseudo; });
-}
-
-filters::Thresholds thresholds(const BuildConfig& config) {
-  if (!config.filter.tau_low || !config.filter.tau_high) {
-    throw ConfigError(
-        "the config has no \"filter\": {\"tau_low\", \"tau_high\"}: the thresholds depend on the pool and "
-        "the "
-        "network, so there is no default. Run `quadruped3d calibrate` with the same config; it prints them "
-        "and "
-        "writes a file that `build --config` takes as a second layer");
-  }
-  filters::Thresholds result;
-  result.tau_low = *config.filter.tau_low;
-  result.tau_high = *config.filter.tau_high;
-  result.delta = config.filter.delta;
-  result.iterations_min = config.tta.iterations_min;
-  result.iterations_max = config.tta.iterations_max;
-  try {
-    filters::check(result);
-  } catch (const std::invalid_argument& error) {
-    throw ConfigError(std::string("filter: ") + error.what());
-  }
-  return result;
 }
 
 }  // namespace q3d::pipeline

@@ -6,12 +6,13 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "filters/calibrate.h"
-#include "filters/fidelity.h"
+#include "filters/guards.h"
 #include "loaders/dataset.h"
 #include "pipeline/role.h"
 
@@ -41,10 +42,32 @@ struct TtaConfig {
   int batch = 8;
 };
 
+// Thresholds of one dataset; what is absent is as for the others.
+struct DatasetThresholds {
+  std::optional<double> tau_low;  // crop units; both or none
+  std::optional<double> tau_high;
+  std::optional<double> delta;
+};
+
 struct FilterConfig {
   std::optional<double> tau_low;  // crop units; absent until calibrated
   std::optional<double> tau_high;
   double delta = 0.05;
+  std::map<std::string, DatasetThresholds> datasets;  // by the dataset's name
+};
+
+// The guards, all off: bounds on labels, and what changes adaptation.
+struct GuardConfig : filters::GuardBounds {
+  int iterations_full_at = 0;   // visible keypoints from which a sample gets all its iterations; 0 = off
+  double held_out_share = 0.0;  // of the visible keypoints; 0 = off
+  std::uint64_t held_out_seed = 0;
+  int held_out_patience = 0;     // iterations without a new least held-out error; 0 = no limit
+  std::filesystem::path priors;  // pose and shape priors; empty = the checkpoint's
+};
+
+// What `calibrate` aims at.
+struct CalibrateConfig : filters::TargetShares {
+  bool per_dataset = false;  // thresholds for each dataset instead of common ones
 };
 
 struct ShardConfig {
@@ -58,12 +81,14 @@ struct ShardConfig {
 struct BuildConfig {
   std::string name = "quadruped3d";
   std::string version = "1.0.0";  // semantic version of the dataset, the user's own
+  std::string profile = "paper";  // the set of guards that the config starts from; pipeline/profiles.h
   std::vector<DatasetConfig> datasets;
   NetworkConfig network;  // without paths when the config names none
   TtaConfig tta;
   FilterConfig filter;
+  GuardConfig guards;
   ShardConfig shards;
-  filters::TargetShares calibrate;
+  CalibrateConfig calibrate;
   nlohmann::json as_written;  // the merged JSON, paths as the user wrote them
 };
 
@@ -74,11 +99,8 @@ BuildConfig load_build_config(const std::vector<std::filesystem::path>& files);
 // Checks and converts merged JSON; `where` names it in messages.
 BuildConfig parse_build_config(const nlohmann::json& json, const std::string& where);
 
-// Whether a dataset has the role `pseudo`. A build that needs no network takes no notice of `network`, `tta`
-// and `filter`.
+// Whether a dataset has the role `pseudo`. A build that needs no network takes no notice of `network`, `tta`,
+// `filter` and `guards`.
 bool needs_network(const BuildConfig& config);
-
-// The thresholds of a calibrated config. Throws ConfigError naming `calibrate` when they are absent.
-filters::Thresholds thresholds(const BuildConfig& config);
 
 }  // namespace q3d::pipeline

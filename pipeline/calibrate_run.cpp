@@ -1,5 +1,6 @@
 #include "pipeline/calibrate_run.h"
 
+#include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
 #include <nlohmann/json.hpp>
@@ -8,8 +9,11 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <stdexcept>
 
+#include "filters/metrics.h"
+#include "loaders/crop.h"
 #include "manifests/atomic_file.h"
 #include "pipeline/errors.h"
 #include "pipeline/interrupt.h"
@@ -23,15 +27,22 @@
 namespace q3d::pipeline {
 namespace {
 
+constexpr std::size_t kCurvePoints = 200;
 constexpr double kNoLimit = std::numeric_limits<double>::infinity();
 
-// L_proj of every candidate's prediction; NaN for the failed and for those that are not predicted. What an
-// earlier run predicted is not predicted again.
-std::vector<double> initial_errors(const BuildConfig& config, Workspace& workspace) {
+// A candidate with a prediction.
+struct Scored {
+  const Candidate* candidate = nullptr;
+  filters::ScoredSample score;
+};
+
+// Of every candidate with pseudo labels and a prediction, in ingest order. What an earlier run predicted is
+// not predicted again.
+std::vector<Scored> predict_pool(const BuildConfig& config, Workspace& workspace) {
   const Ingest& ingest = workspace.ingest();
   StageStore predictions(workspace.out(), "predict",
                          predict_key(config, workspace.assets(), workspace.device_key()));
-  std::vector<double> errors(ingest.candidates.size());
+  std::vector<Scored> scored;
   Progress progress("predicted", static_cast<std::int64_t>(ingest.candidates.size()), workspace.quiet());
   UnitFlow flow;
   flow.units = static_cast<std::int64_t>(ingest.units.size());
@@ -50,39 +61,46 @@ std::vector<double> initial_errors(const BuildConfig& config, Workspace& workspa
   flow.write = [&](UnitWork& work) {
     if (!work.predicted_before) predictions.save(*work.unit, to_table(*work.predicted));
     for (std::size_t i = 0; i < work.candidates.size(); ++i) {
-      errors[work.unit->first + i] = initial_error(work.candidates[i], (*work.predicted)[i]);
+      const PredictedSample& predicted = (*work.predicted)[i];
+      const double error = initial_error(work.candidates[i], predicted);
+      if (std::isnan(error)) continue;
+      const auto auc = filters::auc(predicted.body.keypoints_2d, crop_keypoints(work.candidates[i].record),
+                                    loaders::kPatchSidePx);
+      scored.push_back({&work.candidates[i], {error, 100.0 * auc.value()}});
     }
     progress.advance(static_cast<std::int64_t>(work.unit->count), work.predicted_before);
   };
   run(flow, workspace.device());
-  return errors;
+  return scored;
 }
 
-// Adapts some candidates and says which of them the fidelity rule would keep.
-std::vector<bool> adapt_some(const std::vector<const Candidate*>& candidates,
-                             const filters::Thresholds& limits, const ShardConfig& shards,
-                             Workspace& workspace) {
+// Adapts some candidates for as long as the gain is measured and says which of them the fidelity rule would
+// keep. `limits` has no tau_high, so that all of them lie in the middle band.
+std::vector<bool> adapt_some(const std::vector<const Scored*>& candidates, const filters::Thresholds& limits,
+                             const BuildConfig& config, Workspace& workspace) {
   std::vector<std::vector<std::uint8_t>> patches(candidates.size());
   tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t i) {
-    patches[i] = decode_sample(candidates[i]->record, {.patch = true, .stored_crop = false}, shards).patch;
+    patches[i] = decode_sample(candidates[i]->candidate->record, {.patch = true}, config.shards).patch;
   });
   std::vector<AdaptRequest> requests;
   std::vector<std::size_t> positions;
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     if (patches[i].empty()) continue;
-    AdaptRequest& request = requests.emplace_back();
-    request.patch = patches[i];
-    request.keypoints = crop_keypoints(candidates[i]->record);
-    request.iterations = limits.gain_window;
-    request.stop_below = limits.tau_low;
+    requests.push_back(adapt_request(candidates[i]->candidate->record, patches[i],
+                                     candidates[i]->score.initial_error, limits, config.guards));
     positions.push_back(i);
   }
   std::vector<AdaptOutcome> outcomes;
   workspace.device().run([&] { outcomes = workspace.network().adapt(requests); });
   std::vector<bool> passes(candidates.size(), false);
   for (std::size_t j = 0; j < outcomes.size(); ++j) {
+    const Scored& scored = *candidates[positions[j]];
+    RefinedSample refined;
+    refined.curve = std::move(outcomes[j].curve);
+    refined.held_out_curve = std::move(outcomes[j].held_out_curve);
     passes[positions[j]] =
-        filters::judge_adapted(outcomes[j].curve, limits).verdict == manifests::Verdict::refined;
+        judge_refined(scored.candidate->record, scored.score.initial_error, refined, limits, config.guards)
+            .verdict == manifests::Verdict::refined;
   }
   return passes;
 }
@@ -90,9 +108,8 @@ std::vector<bool> adapt_some(const std::vector<const Candidate*>& candidates,
 // Adapts candidates from tau_low upwards, a chunk at a time, until enough have passed. Those further out keep
 // `passes_adaptation`: they lie beyond tau_high whatever they would do.
 std::int64_t adapt_until_enough(std::vector<filters::CalibrationSample>& pool,
-                                const std::vector<const Candidate*>& candidates,
-                                const filters::Thresholds& limits, const BuildConfig& config,
-                                Workspace& workspace) {
+                                const std::vector<Scored>& candidates, const filters::Thresholds& limits,
+                                const BuildConfig& config, Workspace& workspace) {
   const auto chunk = static_cast<std::size_t>(config.tta.batch) * 4;
   const auto needed =
       static_cast<std::int64_t>(std::ceil(config.calibrate.refined * static_cast<double>(pool.size()))) + 1;
@@ -109,9 +126,9 @@ std::int64_t adapt_until_enough(std::vector<filters::CalibrationSample>& pool,
   while (done < order.size() && passed < needed) {
     throw_if_interrupted();
     const std::size_t count = std::min(chunk, order.size() - done);
-    std::vector<const Candidate*> some;
-    for (std::size_t i = 0; i < count; ++i) some.push_back(candidates[order[done + i]]);
-    const std::vector<bool> passes = adapt_some(some, limits, config.shards, workspace);
+    std::vector<const Scored*> some;
+    for (std::size_t i = 0; i < count; ++i) some.push_back(&candidates[order[done + i]]);
+    const std::vector<bool> passes = adapt_some(some, limits, config, workspace);
     for (std::size_t i = 0; i < count; ++i) {
       pool[order[done + i]].passes_adaptation = passes[i];
       passed += passes[i] ? 1 : 0;
@@ -120,6 +137,56 @@ std::int64_t adapt_until_enough(std::vector<filters::CalibrationSample>& pool,
     progress.advance(static_cast<std::int64_t>(count));
   }
   return static_cast<std::int64_t>(done);
+}
+
+double delta_of(const std::string& dataset, const FilterConfig& filter) {
+  const auto own = filter.datasets.find(dataset);
+  return own == filter.datasets.end() ? filter.delta : own->second.delta.value_or(filter.delta);
+}
+
+CalibratedPool calibrate_pool(const std::string& dataset, const std::vector<Scored>& candidates,
+                              const BuildConfig& config, Workspace& workspace) {
+  if (candidates.empty()) {
+    throw std::runtime_error(fmt::format(
+        "no candidate{} could be predicted, so there is nothing to calibrate on; `build` with any thresholds "
+        "lists why in verdicts.csv",
+        dataset.empty() ? "" : " of the dataset " + dataset));
+  }
+  std::vector<filters::CalibrationSample> pool;
+  std::vector<filters::ScoredSample> scores;
+  for (const Scored& scored : candidates) {
+    pool.push_back({scored.score.initial_error, true});
+    scores.push_back(scored.score);
+  }
+  filters::Thresholds base;
+  base.delta = delta_of(dataset, config.filter);
+  // tau_low is a quantile of the errors alone; what passes adaptation decides tau_high.
+  filters::Thresholds limits = filters::calibrate(pool, config.calibrate, base).thresholds;
+  limits.tau_high = kNoLimit;
+  limits.iterations_min = limits.iterations_max = limits.gain_window;
+  CalibratedPool result;
+  result.dataset = dataset;
+  result.adapted = adapt_until_enough(pool, candidates, limits, config, workspace);
+  result.calibration = filters::calibrate(pool, config.calibrate, base);
+  result.judged = static_cast<std::int64_t>(pool.size());
+  result.curve = filters::yield_curve(scores, kCurvePoints);
+  result.at_tau_low = filters::yield_at(scores, result.calibration.thresholds.tau_low);
+  result.at_tau_high = filters::yield_at(scores, result.calibration.thresholds.tau_high);
+  return result;
+}
+
+// All candidates under the empty name, or those of each dataset with pseudo labels under its own.
+std::map<std::string, std::vector<Scored>> split_pool(std::vector<Scored> scored, const BuildConfig& config) {
+  std::map<std::string, std::vector<Scored>> pools;
+  if (!config.calibrate.per_dataset) {
+    pools[""] = std::move(scored);
+    return pools;
+  }
+  for (const DatasetConfig& dataset : config.datasets) {
+    if (dataset.role == Role::pseudo) pools[dataset.name];
+  }
+  for (const Scored& each : scored) pools[each.candidate->record.dataset].push_back(each);
+  return pools;
 }
 
 }  // namespace
@@ -132,39 +199,30 @@ CalibrationSummary calibrate(const BuildConfig& config, const RunOptions& option
   }
   const auto start = std::chrono::steady_clock::now();
   Workspace workspace(config, options);
-  const std::vector<double> errors = initial_errors(config, workspace);
-  std::vector<filters::CalibrationSample> pool;
-  std::vector<const Candidate*> candidates;
-  for (std::size_t i = 0; i < errors.size(); ++i) {
-    if (std::isnan(errors[i])) continue;
-    pool.push_back({errors[i], true});
-    candidates.push_back(&workspace.ingest().candidates[i]);
-  }
-  if (pool.empty()) {
-    throw std::runtime_error(
-        "no candidate could be predicted, so there is nothing to calibrate on; `build` with any "
-        "thresholds lists why in verdicts.csv");
-  }
-  filters::Thresholds base;
-  base.delta = config.filter.delta;
-  // tau_low is a quantile of the errors alone; what passes adaptation decides tau_high.
-  filters::Thresholds limits = filters::calibrate(pool, config.calibrate, base).thresholds;
-  limits.tau_high = kNoLimit;
   CalibrationSummary summary;
-  summary.adapted = adapt_until_enough(pool, candidates, limits, config, workspace);
-  summary.calibration = filters::calibrate(pool, config.calibrate, base);
-  summary.candidates = static_cast<std::int64_t>(errors.size());
-  summary.judged = static_cast<std::int64_t>(pool.size());
+  summary.candidates = static_cast<std::int64_t>(workspace.ingest().candidates.size());
+  for (const auto& [dataset, candidates] : split_pool(predict_pool(config, workspace), config)) {
+    summary.pools.push_back(calibrate_pool(dataset, candidates, config, workspace));
+  }
   summary.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return summary;
 }
 
-void write_thresholds(const std::filesystem::path& path, const filters::Thresholds& thresholds) {
-  const nlohmann::ordered_json document = {
-      {"filter",
-       {{"tau_low", thresholds.tau_low}, {"tau_high", thresholds.tau_high}, {"delta", thresholds.delta}}}};
+std::string thresholds_layer(const CalibrationSummary& summary) {
+  nlohmann::ordered_json filter = nlohmann::ordered_json::object();
+  for (const CalibratedPool& pool : summary.pools) {
+    const filters::Thresholds& thresholds = pool.calibration.thresholds;
+    nlohmann::ordered_json& place = pool.dataset.empty() ? filter : filter["datasets"][pool.dataset];
+    place["tau_low"] = thresholds.tau_low;
+    place["tau_high"] = thresholds.tau_high;
+    place["delta"] = thresholds.delta;
+  }
+  return nlohmann::ordered_json{{"filter", filter}}.dump(2) + "\n";
+}
+
+void write_thresholds(const std::filesystem::path& path, const CalibrationSummary& summary) {
   if (path.has_parent_path()) std::filesystem::create_directories(path.parent_path());
-  manifests::write_file_atomically(path, document.dump(2) + "\n");
+  manifests::write_file_atomically(path, thresholds_layer(summary));
 }
 
 }  // namespace q3d::pipeline

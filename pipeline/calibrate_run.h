@@ -2,27 +2,41 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
+#include <vector>
 
 #include "filters/calibrate.h"
+#include "filters/yield_curve.h"
 #include "pipeline/build.h"
 #include "pipeline/build_config.h"
 
 namespace q3d::pipeline {
 
-struct CalibrationSummary {
+// The candidates that share thresholds: all of them, or those of one dataset.
+struct CalibratedPool {
+  std::string dataset;  // empty: all datasets
   filters::Calibration calibration;
-  std::int64_t candidates = 0;
   std::int64_t judged = 0;   // candidates with a prediction
   std::int64_t adapted = 0;  // of the middle band, to see whether they reach delta
+  std::vector<filters::YieldPoint> curve;
+  filters::YieldPoint at_tau_low;
+  filters::YieldPoint at_tau_high;
+};
+
+struct CalibrationSummary {
+  std::vector<CalibratedPool> pools;
+  std::int64_t candidates = 0;
   double seconds = 0.0;
 };
 
 // Predicts every candidate (a later build finds the predictions in the same output folder), then adapts
-// candidates in order of their error until enough of them reach delta. Throws ConfigError,
-// std::runtime_error, Interrupted.
+// candidates in order of their error, under the guards that change adaptation, until enough of them reach
+// delta. AUC is against the annotated keypoints, by the whole crop. With config.calibrate.per_dataset every
+// dataset is a pool of its own. Throws ConfigError, std::runtime_error, Interrupted.
 CalibrationSummary calibrate(const BuildConfig& config, const RunOptions& options);
 
 // A config layer with the thresholds, for `build --config`.
-void write_thresholds(const std::filesystem::path& path, const filters::Thresholds& thresholds);
+void write_thresholds(const std::filesystem::path& path, const CalibrationSummary& summary);
+std::string thresholds_layer(const CalibrationSummary& summary);  // its text
 
 }  // namespace q3d::pipeline

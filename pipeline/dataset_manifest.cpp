@@ -9,6 +9,7 @@
 
 #include "manifests/atomic_file.h"
 #include "manifests/shard.h"
+#include "pipeline/effective_config.h"
 
 namespace q3d::pipeline {
 namespace {
@@ -108,12 +109,23 @@ ordered_json count_labels(const Ingest& ingest, const std::vector<manifests::Jud
   return labels;
 }
 
-// Null where no dataset needed them.
+// Those of each dataset with pseudo labels; null where there is none.
 ordered_json describe_thresholds(const DatasetInputs& inputs) {
   if (!needs_network(*inputs.config)) return nullptr;
-  return {{"tau_low", inputs.thresholds->tau_low},
-          {"tau_high", inputs.thresholds->tau_high},
-          {"delta", inputs.thresholds->delta}};
+  ordered_json datasets = ordered_json::object();
+  for (const auto& [name, thresholds] : inputs.rules->thresholds) {
+    datasets[name] = {
+        {"tau_low", thresholds.tau_low}, {"tau_high", thresholds.tau_high}, {"delta", thresholds.delta}};
+  }
+  return datasets;
+}
+
+// Every guard with its value, 0 = off, without the path of the priors, which `provenance` has a digest of.
+ordered_json describe_guards(const DatasetInputs& inputs) {
+  if (!needs_network(*inputs.config)) return nullptr;
+  ordered_json guards = effective_guards(inputs.config->guards);
+  guards.erase("priors");
+  return guards;
 }
 
 ordered_json text_or_null(const std::string& text) {
@@ -180,19 +192,23 @@ std::string dataset_json(const DatasetInputs& inputs, const std::vector<manifest
                                  {"toolkit", Q3D_VERSION},
                                  {"counts", to_json(counts)},
                                  {"labels", count_labels(*inputs.ingest, judgements)},
+                                 {"profile", inputs.config->profile},
                                  {"thresholds", describe_thresholds(inputs)},
+                                 {"guards", describe_guards(inputs)},
                                  {"statistics", statistics(*inputs.ingest, judgements)},
                                  {"provenance",
                                   {{"config", inputs.config->as_written},
                                    {"annotations", inputs.ingest->annotation_digests},
                                    {"checkpoint_sha256", text_or_null(inputs.assets->checkpoint)},
                                    {"smal_asset_sha256", text_or_null(inputs.assets->smal_asset)},
+                                   {"priors_sha256", text_or_null(inputs.assets->priors)},
                                    {"device", text_or_null(inputs.device_key)},
                                    {"stage_keys",
                                     {{"ingest", keys.ingest},
                                      {"predict", keys.predict},
                                      {"fidelity", keys.fidelity},
                                      {"refine", keys.refine},
+                                     {"measure", text_or_null(keys.measure)},
                                      {"shards", keys.shards}}}}},
                                  {"verdicts", {{"file", "verdicts.csv"}, {"sha256", verdicts_sha256}}},
                                  {"shards", shard_list}};

@@ -53,7 +53,7 @@ std::string content_id(const std::vector<ShardEntry>& shards);
 
 struct DatasetInputs {
   const BuildConfig* config = nullptr;
-  const filters::Thresholds* thresholds = nullptr;  // not read where no network is needed
+  const JudgingRules* rules = nullptr;
   const Ingest* ingest = nullptr;
   const AssetDigests* assets = nullptr;
   const StageKeys* keys = nullptr;

@@ -92,6 +92,17 @@ model::TtaOptions tta_options(const TtaConfig& tta) {
   return options;
 }
 
+model::TtaSchedule schedule_of(const AdaptRequest& request) {
+  model::TtaSchedule schedule;
+  schedule.iterations = request.iterations;
+  schedule.stop_below = request.stop_below;
+  schedule.min_gain = request.min_gain;
+  schedule.gain_window = request.gain_window;
+  schedule.patience = request.patience;
+  for (std::size_t k = 0; k < request.held_out.size(); ++k) schedule.held_out[k] = request.held_out[k];
+  return schedule;
+}
+
 }  // namespace
 
 bool is_finite(const BodyPrediction& body) {
@@ -166,7 +177,7 @@ std::vector<AdaptOutcome> Network::adapt(std::span<const AdaptRequest> requests,
     float* out = keypoints.data_ptr<float>();
     for (const AdaptRequest& request : batch) {
       patches.push_back(request.patch);
-      schedules.push_back({request.iterations, request.stop_below, request.min_gain, request.gain_window});
+      schedules.push_back(schedule_of(request));
       out = std::copy(request.keypoints.begin(), request.keypoints.end(), out);
     }
     const model::Prima& prima = impl_->prima;
@@ -178,7 +189,7 @@ std::vector<AdaptOutcome> Network::adapt(std::span<const AdaptRequest> requests,
     std::vector<BodyPrediction> rows;
     append_rows(result.best, rows);
     for (std::size_t i = 0; i < rows.size(); ++i) {
-      outcomes.push_back({rows[i], result.l_proj[i], result.best_iteration[i], {}});
+      outcomes.push_back({rows[i], result.l_proj[i], result.held_out[i], result.best_iteration[i], {}});
     }
     for (const model::Prediction& snapshot : result.snapshots) {
       std::vector<BodyPrediction> iterates;

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "filters/keypoint_choice.h"
 #include "manifests/sample.h"
 #include "pipeline/build_config.h"
 
@@ -38,11 +39,16 @@ struct AdaptRequest {
   double stop_below = 0.0;  // crop units; 0 = never
   double min_gain = 0.0;    // give up after gain_window iterations below this relative gain; 0 = never
   int gain_window = 10;
+  // Visible keypoints that the objective does not see. Where there are any, the best iterate is the one of
+  // least error on them.
+  filters::KeypointFlags held_out{};
+  int patience = 0;  // stop after so many iterations without a new least held-out error; 0 = never
 };
 
 struct AdaptOutcome {
   BodyPrediction best;
-  std::vector<double> curve;  // L_proj of iterates 0..n, crop units
+  std::vector<double> curve;           // L_proj of iterates 0..n over all visible keypoints, crop units
+  std::vector<double> held_out_curve;  // of the held-out ones alone; empty where there are none
   int best_iteration = 0;
   std::vector<BodyPrediction> snapshots;  // of the iterates that were asked for
 };

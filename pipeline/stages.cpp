@@ -4,10 +4,12 @@
 
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
 #include <stdexcept>
 
 #include "manifests/atomic_file.h"
 #include "manifests/shard.h"
+#include "pipeline/label_measurer.h"
 
 namespace q3d::pipeline {
 namespace {
@@ -19,6 +21,7 @@ constexpr int kIngestCode = 2;
 constexpr int kPredictCode = 1;
 constexpr int kFidelityCode = 1;
 constexpr int kRefineCode = 1;
+constexpr int kMeasureCode = 1;
 constexpr int kShardsCode = 1;
 
 std::string key_of(const char* stage, int code, json parts) {
@@ -39,10 +42,72 @@ std::string ingest_key(const BuildConfig& config, const Ingest& ingest) {
   return key_of("ingest", kIngestCode, {{"datasets", datasets}, {"units", units}});
 }
 
+bool are_equal(const filters::Thresholds& a, const filters::Thresholds& b) {
+  return a.tau_low == b.tau_low && a.tau_high == b.tau_high && a.delta == b.delta &&
+         a.gain_window == b.gain_window;
+}
+
+json thresholds_json(const filters::Thresholds& thresholds) {
+  return {{"tau_low", thresholds.tau_low},
+          {"tau_high", thresholds.tau_high},
+          {"delta", thresholds.delta},
+          {"gain_window", thresholds.gain_window}};
+}
+
+// Common thresholds count the same whether they were given for all datasets or for each of them.
+json fidelity_parts(const JudgingRules& rules) {
+  const filters::Thresholds& first = rules.thresholds.begin()->second;
+  const bool are_common = std::all_of(rules.thresholds.begin(), rules.thresholds.end(),
+                                      [&](const auto& each) { return are_equal(each.second, first); });
+  if (are_common) return thresholds_json(first);
+  json datasets = json::object();
+  for (const auto& [name, thresholds] : rules.thresholds) datasets[name] = thresholds_json(thresholds);
+  return {{"datasets", datasets}};
+}
+
+json refine_parts(const TtaConfig& tta, const GuardConfig& guards) {
+  json parts = {{"objective", tta.objective},
+                {"learning_rate", tta.learning_rate},
+                {"aux_weight", tta.aux_weight},
+                {"reproj_weight", tta.reproj_weight},
+                {"iterations_min", tta.iterations_min},
+                {"iterations_max", tta.iterations_max},
+                {"batch", tta.batch}};
+  if (guards.iterations_full_at > 0) parts["iterations_full_at"] = guards.iterations_full_at;
+  if (guards.held_out_share > 0.0) {
+    parts["held_out"] = {{"share", guards.held_out_share},
+                         {"seed", guards.held_out_seed},
+                         {"patience", guards.held_out_patience}};
+  }
+  return parts;
+}
+
+// What is measured, not what of it is let through.
+json measure_parts(const GuardConfig& guards, const AssetDigests& assets) {
+  json parts = {{"pose_deviation", guards.pose_deviation_max > 0.0},
+                {"limb_factor", guards.limb_factor_max > 0.0},
+                {"left_right", guards.left_right_max > 0.0},
+                {"mask_iou", guards.mask_iou_min > 0.0}};
+  if (!assets.priors.empty()) parts["priors"] = assets.priors;
+  return parts;
+}
+
+json bounds_json(const filters::GuardBounds& bounds) {
+  return {{"visible_min", bounds.visible_min},
+          {"pose_deviation_max", bounds.pose_deviation_max},
+          {"limb_factor_max", bounds.limb_factor_max},
+          {"left_right_max", bounds.left_right_max},
+          {"mask_iou_min", bounds.mask_iou_min}};
+}
+
 }  // namespace
 
-AssetDigests digest_assets(const NetworkConfig& network, manifests::DigestCache& digests) {
-  return {digests.digest(network.checkpoint), digests.digest(network.smal_asset)};
+AssetDigests digest_assets(const BuildConfig& config, manifests::DigestCache& digests) {
+  if (!needs_network(config)) return {};
+  AssetDigests assets{
+      digests.digest(config.network.checkpoint), digests.digest(config.network.smal_asset), {}};
+  if (uses_priors(config.guards)) assets.priors = digests.digest(priors_file(config));
+  return assets;
 }
 
 std::string predict_key(const BuildConfig& config, const AssetDigests& assets,
@@ -59,37 +124,33 @@ std::string predict_key(const BuildConfig& config, const AssetDigests& assets,
                  {"unit_size", config.shards.unit_size}});
 }
 
-StageKeys stage_keys(const BuildConfig& config, const filters::Thresholds& thresholds, const Ingest& ingest,
+StageKeys stage_keys(const BuildConfig& config, const JudgingRules& rules, const Ingest& ingest,
                      const AssetDigests& assets, const std::string& device_key) {
   StageKeys keys;
   keys.ingest = ingest_key(config, ingest);
   keys.predict = predict_key(config, assets, device_key);
-  json fidelity = {{"predict", keys.predict}};
-  json refine = json::object();
-  if (needs_network(config)) {
-    fidelity.update({{"tau_low", thresholds.tau_low},
-                     {"tau_high", thresholds.tau_high},
-                     {"delta", thresholds.delta},
-                     {"gain_window", thresholds.gain_window}});
-    refine.update({{"objective", config.tta.objective},
-                   {"learning_rate", config.tta.learning_rate},
-                   {"aux_weight", config.tta.aux_weight},
-                   {"reproj_weight", config.tta.reproj_weight},
-                   {"iterations_min", config.tta.iterations_min},
-                   {"iterations_max", config.tta.iterations_max},
-                   {"batch", config.tta.batch}});
-  }
+  const bool judges = needs_network(config);
+  json fidelity = judges ? fidelity_parts(rules) : json::object();
+  fidelity["predict"] = keys.predict;
   keys.fidelity = key_of("fidelity", kFidelityCode, std::move(fidelity));
+  json refine = judges ? refine_parts(config.tta, config.guards) : json::object();
   refine["fidelity"] = keys.fidelity;
   keys.refine = key_of("refine", kRefineCode, std::move(refine));
-  keys.shards = key_of("shards", kShardsCode,
-                       {{"refine", keys.refine},
-                        {"schema", manifests::kShardSchema},
-                        {"name", config.name},
-                        {"images", config.shards.images},
-                        {"jpeg_quality", config.shards.jpeg_quality},
-                        {"crop_scale", config.shards.crop_scale},
-                        {"crop_min_side_px", config.shards.crop_min_side_px}});
+  json shards = {{"refine", keys.refine},
+                 {"schema", manifests::kShardSchema},
+                 {"name", config.name},
+                 {"images", config.shards.images},
+                 {"jpeg_quality", config.shards.jpeg_quality},
+                 {"crop_scale", config.shards.crop_scale},
+                 {"crop_min_side_px", config.shards.crop_min_side_px}};
+  if (judges && rules.measures_labels()) {
+    json measure = measure_parts(config.guards, assets);
+    measure["refine"] = keys.refine;
+    keys.measure = key_of("measure", kMeasureCode, std::move(measure));
+    shards["measure"] = keys.measure;
+    shards["bounds"] = bounds_json(config.guards);
+  }
+  keys.shards = key_of("shards", kShardsCode, std::move(shards));
   keys.dataset =
       key_of("dataset", 1, {{"ingest", keys.ingest}, {"shards", keys.shards}, {"version", config.version}});
   return keys;

@@ -3,7 +3,8 @@
 // A stage's key is a hash of its code version, its part of the config, the keys of the stages before it and
 // the digests of the assets it reads. What a stage made lies in <out>/stages/<stage>-<key>/, one file a unit
 // and a journal; a unit's file counts only if the journal holds it with the unit's own input digest. So a
-// changed tau redoes the verdicts and what follows, and added photos make only new units and the last one.
+// changed tau redoes the verdicts and what follows, a changed bound of a guard the shards alone, and added
+// photos make only new units and the last one.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -11,10 +12,10 @@
 #include <filesystem>
 #include <string>
 
-#include "filters/fidelity.h"
 #include "manifests/digest.h"
 #include "pipeline/build_config.h"
 #include "pipeline/ingest.h"
+#include "pipeline/judging_rules.h"
 
 namespace q3d::pipeline {
 
@@ -24,9 +25,10 @@ inline constexpr std::size_t kShortKey = 12;  // hex digits of a key that appear
 struct AssetDigests {
   std::string checkpoint;
   std::string smal_asset;
+  std::string priors;  // empty unless a guard needs them
 };
 // Throws std::runtime_error when a file is missing.
-AssetDigests digest_assets(const NetworkConfig& network, manifests::DigestCache& digests);
+AssetDigests digest_assets(const BuildConfig& config, manifests::DigestCache& digests);
 
 // Keys are 64 hex digits. device_key is pipeline::device_key(), or empty for a build
 // that needs no network: its keys hold nothing of network, thresholds and adaptation.
@@ -35,12 +37,13 @@ struct StageKeys {
   std::string predict;
   std::string fidelity;
   std::string refine;
+  std::string measure;  // what the guards' bounds look at; empty when none is on
   std::string shards;
   std::string dataset;  // the version: everything above
 };
 
 std::string predict_key(const BuildConfig& config, const AssetDigests& assets, const std::string& device_key);
-StageKeys stage_keys(const BuildConfig& config, const filters::Thresholds& thresholds, const Ingest& ingest,
+StageKeys stage_keys(const BuildConfig& config, const JudgingRules& rules, const Ingest& ingest,
                      const AssetDigests& assets, const std::string& device_key);
 
 // <out>/stages/<stage>-<first 12 of key>.

@@ -7,6 +7,7 @@
 #include <limits>
 #include <optional>
 
+#include "filters/keypoint_choice.h"
 #include "filters/metrics.h"
 #include "loaders/box.h"
 #include "loaders/crop.h"
@@ -23,23 +24,31 @@ using filters::Band;
 using manifests::Reason;
 using manifests::Verdict;
 
+bool is_kept(const manifests::Judgement& judgement) {
+  return judgement.verdict == Verdict::retained || judgement.verdict == Verdict::refined;
+}
+
 // Nothing when the picture is not needed at all.
-std::optional<Wanted> wanted(const UnitWork& work, std::size_t i, const filters::Thresholds* thresholds) {
-  if (work.candidates[i].record.failure != Reason::none) return std::nullopt;
-  const bool is_pseudo = work.candidates[i].role == Role::pseudo;
-  const bool makes_shard = thresholds != nullptr && !work.shard_before;
-  if (!work.predicted) return Wanted{is_pseudo, makes_shard};
-  if (thresholds == nullptr || (*work.predicted)[i].failure != Reason::none) return std::nullopt;
-  if (!is_pseudo) return makes_shard ? std::optional(Wanted{false, true}) : std::nullopt;
-  const double error = initial_error(work.candidates[i], (*work.predicted)[i]);
+std::optional<Wanted> wanted(const UnitWork& work, std::size_t i, const JudgingRules* rules) {
+  const Candidate& candidate = work.candidates[i];
+  if (candidate.record.failure != Reason::none) return std::nullopt;
+  const bool is_pseudo = candidate.role == Role::pseudo;
+  const bool makes_shard = rules != nullptr && !work.shard_before;
+  const bool measures_mask = is_pseudo && rules != nullptr && rules->guards.mask_iou_min > 0.0 &&
+                             !work.measured && !candidate.record.mask_path.empty();
+  if (!work.predicted) {
+    return Wanted{.patch = is_pseudo, .stored_crop = makes_shard, .patch_mask = measures_mask};
+  }
+  if (rules == nullptr || (*work.predicted)[i].failure != Reason::none) return std::nullopt;
+  if (!is_pseudo) return makes_shard ? std::optional(Wanted{.stored_crop = true}) : std::nullopt;
+  const double error = initial_error(candidate, (*work.predicted)[i]);
   if (std::isnan(error)) return std::nullopt;
-  const Band band = filters::band(error, *thresholds);
-  const bool adapts = band == Band::refine && !work.refined;
-  const bool may_be_kept = work.refined ? work.judgements[i].verdict == Verdict::retained ||
-                                              work.judgements[i].verdict == Verdict::refined
-                                        : band != Band::discard;
-  const bool stores = may_be_kept && makes_shard;
-  return adapts || stores ? std::optional(Wanted{adapts, stores}) : std::nullopt;
+  const Band band = filters::band(error, rules->of(candidate.record.dataset));
+  const bool may_be_kept = work.refined ? is_kept(work.judgements[i]) : band != Band::discard;
+  const Wanted want{.patch = band == Band::refine && !work.refined,
+                    .stored_crop = may_be_kept && makes_shard,
+                    .patch_mask = may_be_kept && measures_mask};
+  return want.patch || want.stored_crop || want.patch_mask ? std::optional(want) : std::nullopt;
 }
 
 void store_crop(DecodedSample& sample, const cv::Mat& rgb, const cv::Mat& mask, const loaders::SquareBox& box,
@@ -62,6 +71,17 @@ manifests::Judgement failed(Reason reason, const std::string& detail) {
   return judgement;
 }
 
+// adapt_request lets a sample of one visible keypoint take no step: nothing could tell whether it helped.
+manifests::Judgement nothing_to_hold_out(const RefinedSample& refined) {
+  manifests::Judgement judgement;
+  judgement.verdict = Verdict::discarded;
+  judgement.reason = Reason::held_out_not_better;
+  judgement.detail = "one visible keypoint: none can be held out";
+  judgement.initial_error = refined.curve[0];
+  judgement.final_error = refined.curve[0];
+  return judgement;
+}
+
 // What the network has no part in is kept as it came.
 manifests::Judgement judge_annotated(const Candidate& candidate, const BodyPrediction& body) {
   manifests::Judgement judgement;
@@ -74,10 +94,10 @@ manifests::Judgement judge_annotated(const Candidate& candidate, const BodyPredi
 }
 
 manifests::Judgement judge_predicted(const Candidate& candidate, const PredictedSample& predicted,
-                                     const filters::Thresholds& thresholds) {
+                                     const JudgingRules& rules) {
   if (predicted.failure != Reason::none) return failed(predicted.failure, predicted.detail);
   if (candidate.role != Role::pseudo) return judge_annotated(candidate, predicted.body);
-  return filters::judge_initial(initial_error(candidate, predicted), thresholds);
+  return filters::judge_initial(initial_error(candidate, predicted), rules.of(candidate.record.dataset));
 }
 
 // The body of a candidate whose role is not `pseudo`, and what its label will lack.
@@ -116,13 +136,16 @@ DecodedSample decode_sample(const manifests::SampleRecord& record, Wanted want, 
     return sample;
   }
   const loaders::SquareBox square = loaders::square_box(record.box);
-  if (want.patch) {
-    const bool warps_mask = want.mask_area && has_mask;
+  if (want.patch || want.patch_mask) {
+    const bool warps_mask = (want.mask_area || want.patch_mask) && has_mask;
     const loaders::Patch patch =
         loaders::make_patch(image.rgb, warps_mask ? mask.silhouette : cv::Mat(), square);
     sample.patch.assign(patch.rgb.datastart, patch.rgb.dataend);
     // Official evaluator: the sum of the warped mask / 255, soft edges included.
     if (patch.has_mask) sample.mask_area_px = cv::sum(patch.mask)[0] / 255.0;
+    if (want.patch_mask && patch.has_mask) {
+      sample.patch_mask.assign(patch.mask.datastart, patch.mask.dataend);
+    }
   }
   if (want.stored_crop) store_crop(sample, image.rgb, has_mask ? mask.silhouette : cv::Mat(), square, shards);
   sample.decoded = true;
@@ -141,11 +164,11 @@ double initial_error(const Candidate& candidate, const PredictedSample& predicte
       .value_or(kNone);
 }
 
-void decode_unit(UnitWork& work, const ShardConfig& shards, const filters::Thresholds* thresholds) {
+void decode_unit(UnitWork& work, const ShardConfig& shards, const JudgingRules* rules) {
   work.decoded.assign(work.candidates.size(), {});
   tbb::parallel_for(std::size_t{0}, work.candidates.size(), [&](std::size_t i) {
     if (interrupted()) return;
-    if (const auto want = wanted(work, i, thresholds)) {
+    if (const auto want = wanted(work, i, rules)) {
       work.decoded[i] = decode_sample(work.candidates[i].record, *want, shards);
     }
   });
@@ -186,17 +209,51 @@ void predict_unit(UnitWork& work, const NetworkSource& network) {
   work.predicted = std::move(samples);
 }
 
-void judge_unit(UnitWork& work, const filters::Thresholds& thresholds) {
+int visible_keypoints(const CropKeypoints& keypoints) {
+  int visible = 0;
+  for (std::size_t k = 0; k < manifests::kNumKeypoints; ++k) visible += keypoints[3 * k + 2] > 0.0F ? 1 : 0;
+  return visible;
+}
+
+manifests::Judgement judge_refined(const manifests::SampleRecord& record, double error,
+                                   const RefinedSample& refined, const filters::Thresholds& thresholds,
+                                   const GuardConfig& guards) {
+  if (refined.curve.empty()) {
+    return failed(Reason::prediction_not_finite, "nothing could be measured in adaptation");
+  }
+  const int visible = visible_keypoints(crop_keypoints(record));
+  if (guards.held_out_share > 0.0 && refined.held_out_curve.empty()) return nothing_to_hold_out(refined);
+  manifests::Judgement judgement =
+      guards.held_out_share > 0.0 ? filters::judge_held_out(refined.curve, refined.held_out_curve, thresholds)
+                                  : filters::judge_adapted(refined.curve, thresholds);
+  if (visible >= guards.iterations_full_at) return judgement;
+  const int unscaled = filters::adaptation_iterations(error, thresholds);
+  const int scaled = filters::scaled_iterations(unscaled, visible, guards.iterations_full_at);
+  if (judgement.reason == Reason::gain_too_small && scaled < thresholds.gain_window) {
+    judgement.reason = Reason::scaled_gain_too_small;
+  }
+  judgement.detail += fmt::format("{}at most {} of {} iterations for {} visible keypoints",
+                                  judgement.detail.empty() ? "" : "; ", scaled, unscaled, visible);
+  return judgement;
+}
+
+void judge_unit(UnitWork& work, const JudgingRules& rules) {
   work.judgements.assign(work.candidates.size(), {});
   for (std::size_t i = 0; i < work.candidates.size(); ++i) {
-    work.judgements[i] = judge_predicted(work.candidates[i], (*work.predicted)[i], thresholds);
+    work.judgements[i] = judge_predicted(work.candidates[i], (*work.predicted)[i], rules);
   }
   if (work.refined) {
     for (const RefinedSample& refined : *work.refined) {
+      const Candidate& candidate = work.candidates[refined.sample];
+      const double error = initial_error(candidate, (*work.predicted)[refined.sample]);
       work.judgements[refined.sample] =
-          refined.curve.empty()
-              ? failed(Reason::prediction_not_finite, "nothing could be measured in adaptation")
-              : filters::judge_adapted(refined.curve, thresholds);
+          judge_refined(candidate.record, error, refined, rules.of(candidate.record.dataset), rules.guards);
+    }
+  }
+  if (work.measured) {
+    for (const MeasuredLabel& label : *work.measured) {
+      manifests::Judgement& judgement = work.judgements[label.sample];
+      judgement = filters::apply_bounds(std::move(judgement), label.measures, rules.guards);
     }
   }
   for (std::size_t i = 0; i < work.candidates.size(); ++i) {
@@ -205,26 +262,43 @@ void judge_unit(UnitWork& work, const filters::Thresholds& thresholds) {
   }
 }
 
-void refine_unit(UnitWork& work, const NetworkSource& network, const filters::Thresholds& thresholds) {
+AdaptRequest adapt_request(const manifests::SampleRecord& record, PatchView patch, double error,
+                           const filters::Thresholds& thresholds, const GuardConfig& guards) {
+  AdaptRequest request;
+  request.patch = patch;
+  request.keypoints = crop_keypoints(record);
+  const int visible = visible_keypoints(request.keypoints);
+  request.iterations = filters::scaled_iterations(filters::adaptation_iterations(error, thresholds), visible,
+                                                  guards.iterations_full_at);
+  request.stop_below = thresholds.tau_low;
+  request.min_gain = thresholds.delta;
+  request.gain_window = thresholds.gain_window;
+  if (guards.held_out_share == 0.0) return request;
+  request.held_out =
+      filters::held_out_keypoints(request.keypoints, guards.held_out_share, guards.held_out_seed, record.id);
+  request.patience = guards.held_out_patience;
+  if (visible < 2) request.iterations = 0;
+  return request;
+}
+
+void refine_unit(UnitWork& work, const NetworkSource& network, const JudgingRules& rules) {
   if (work.refined) return;
   std::vector<AdaptRequest> requests;
   std::vector<RefinedSample> samples;
   for (std::size_t i = 0; i < work.candidates.size(); ++i) {
     const double error = initial_error(work.candidates[i], (*work.predicted)[i]);
-    if (std::isnan(error) || filters::band(error, thresholds) != Band::refine) continue;
-    AdaptRequest& request = requests.emplace_back();
-    request.patch = work.decoded[i].patch;
-    request.keypoints = crop_keypoints(work.candidates[i].record);
-    request.iterations = filters::adaptation_iterations(error, thresholds);
-    request.stop_below = thresholds.tau_low;
-    request.min_gain = thresholds.delta;
-    request.gain_window = thresholds.gain_window;
+    if (std::isnan(error)) continue;
+    const manifests::SampleRecord& record = work.candidates[i].record;
+    const filters::Thresholds& thresholds = rules.of(record.dataset);
+    if (filters::band(error, thresholds) != Band::refine) continue;
+    requests.push_back(adapt_request(record, work.decoded[i].patch, error, thresholds, rules.guards));
     samples.emplace_back().sample = i;
   }
   std::vector<AdaptOutcome> outcomes;
   if (!requests.empty()) outcomes = network().adapt(requests);
   for (std::size_t j = 0; j < outcomes.size(); ++j) {
     samples[j].curve = std::move(outcomes[j].curve);
+    samples[j].held_out_curve = std::move(outcomes[j].held_out_curve);
     samples[j].body = outcomes[j].best;
   }
   work.refined = std::move(samples);

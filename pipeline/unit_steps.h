@@ -4,8 +4,7 @@
 
 #include <functional>
 
-#include "filters/fidelity.h"
-#include "pipeline/build_config.h"
+#include "pipeline/judging_rules.h"
 #include "pipeline/network.h"
 #include "pipeline/unit_work.h"
 
@@ -18,16 +17,17 @@ CropKeypoints crop_keypoints(const manifests::SampleRecord& record);
 struct Wanted {
   bool patch = false;
   bool stored_crop = false;
-  bool mask_area = false;  // of the patch; comes with it
+  bool mask_area = false;   // of the patch; comes with it
+  bool patch_mask = false;  // likewise
 };
 
 // One candidate's picture: decoded, checked, cropped. A bad picture is a failure in the result.
 DecodedSample decode_sample(const manifests::SampleRecord& record, Wanted want, const ShardConfig& shards);
 
 // Decodes (in parallel) the pictures that the steps to come need: all of them before predict, the middle band
-// before refine, the kept ones before writing a shard. `thresholds` may be null when only predictions are
-// wanted; then no stored crops are made.
-void decode_unit(UnitWork& work, const ShardConfig& shards, const filters::Thresholds* thresholds);
+// before refine, the kept ones before measuring against masks and before writing a shard. `rules` may be null
+// when only predictions are wanted; then no stored crops are made.
+void decode_unit(UnitWork& work, const ShardConfig& shards, const JudgingRules* rules);
 
 // Gives the network when it is first needed: a unit without pseudo labels needs none.
 using NetworkSource = std::function<Network&()>;
@@ -36,14 +36,27 @@ using NetworkSource = std::function<Network&()>;
 // others get the body that their annotation gives, or none.
 void predict_unit(UnitWork& work, const NetworkSource& network);
 
-// Fills work.judgements from what is known: failures, bands, and adaptation curves where there are any. What
-// is no pseudo label is retained as it came; L_proj of a truth, where it has a projection, is its final
-// error.
-void judge_unit(UnitWork& work, const filters::Thresholds& thresholds);
+// Fills work.judgements from what is known: failures, bands, adaptation curves and measured labels where
+// there are any. What is no pseudo label is retained as it came; L_proj of a truth, where it has a
+// projection, is its final error.
+void judge_unit(UnitWork& work, const JudgingRules& rules);
 
 // Adapts the middle band in batches inside the unit. Features are recomputed from the crops, so a resumed
 // build gives the same bits as one in a single go.
-void refine_unit(UnitWork& work, const NetworkSource& network, const filters::Thresholds& thresholds);
+void refine_unit(UnitWork& work, const NetworkSource& network, const JudgingRules& rules);
+
+// How a candidate of the middle band is adapted under the rules: iterations by its error and visible
+// keypoints, and the keypoints that it does not see. `patch` must outlive the request.
+AdaptRequest adapt_request(const manifests::SampleRecord& record, PatchView patch, double error,
+                           const filters::Thresholds& thresholds, const GuardConfig& guards);
+
+// The verdict on a candidate that was adapted by adapt_request, before any bound: by its curve, and by the
+// held-out one where there is one.
+manifests::Judgement judge_refined(const manifests::SampleRecord& record, double error,
+                                   const RefinedSample& refined, const filters::Thresholds& thresholds,
+                                   const GuardConfig& guards);
+
+int visible_keypoints(const CropKeypoints& keypoints);  // of weight > 0
 
 // The initial L_proj of a predicted candidate; NaN when it failed or its role is not `pseudo`.
 double initial_error(const Candidate& candidate, const PredictedSample& predicted);

@@ -66,6 +66,36 @@ void read_bodies(const Table& table, std::vector<Row>& rows) {
   });
 }
 
+// float64 numbers, as many a row as its curve has.
+void add_curves(Table& table, const std::string& name, const std::vector<RefinedSample>& samples,
+                std::vector<double> RefinedSample::*curve) {
+  auto& blobs = table.blobs[name];
+  for (const RefinedSample& sample : samples) {
+    const auto bytes = std::as_bytes(std::span(sample.*curve));
+    blobs.emplace_back(bytes.begin(), bytes.end());
+  }
+}
+
+// Leaves the curves empty where the table has no such column.
+void read_curves(const Table& table, const std::string& name, std::vector<RefinedSample>& samples,
+                 std::vector<double> RefinedSample::*curve) {
+  const auto blobs = table.blobs.find(name);
+  if (blobs == table.blobs.end()) return;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const auto& bytes = blobs->second[i];
+    auto& numbers = samples[i].*curve;
+    numbers.resize(bytes.size() / sizeof(double));
+    std::memcpy(numbers.data(), bytes.data(), numbers.size() * sizeof(double));
+  }
+}
+
+constexpr std::array<std::pair<const char*, double filters::LabelMeasures::*>, 4> kMeasureColumns{{
+    {"pose_deviation", &filters::LabelMeasures::pose_deviation},
+    {"limb_factor", &filters::LabelMeasures::limb_factor},
+    {"left_right", &filters::LabelMeasures::left_right},
+    {"mask_iou", &filters::LabelMeasures::mask_iou},
+}};
+
 const std::vector<std::string>& text_column(const Table& table, const std::string& name) {
   const auto found = table.text.find(name);
   if (found == table.text.end()) throw std::runtime_error("text column " + name + " is missing");
@@ -113,12 +143,13 @@ Table to_table(const std::vector<RefinedSample>& samples) {
   Table table;
   table.rows = static_cast<std::int64_t>(samples.size());
   std::vector<std::int64_t> positions;
-  auto& curves = table.blobs["curve"];  // float64 L_proj of iterates 0..n
-  for (const RefinedSample& sample : samples) {
-    positions.push_back(static_cast<std::int64_t>(sample.sample));
-    const auto bytes = std::as_bytes(std::span(sample.curve));
-    curves.emplace_back(bytes.begin(), bytes.end());
-  }
+  for (const RefinedSample& sample : samples) positions.push_back(static_cast<std::int64_t>(sample.sample));
+  add_curves(table, "curve", samples, &RefinedSample::curve);
+  // The column is absent where nothing was held out.
+  const bool holds_out = std::any_of(samples.begin(), samples.end(), [](const RefinedSample& sample) {
+    return !sample.held_out_curve.empty();
+  });
+  if (holds_out) add_curves(table, "held_out_curve", samples, &RefinedSample::held_out_curve);
   table.add<std::int64_t>("sample", {}, positions);
   add_bodies(table, samples);
   return table;
@@ -128,16 +159,48 @@ std::vector<RefinedSample> refined_from_table(const Table& table) {
   std::vector<RefinedSample> samples(static_cast<std::size_t>(table.rows));
   if (samples.empty()) return samples;
   const auto positions = table.column<std::int64_t>("sample");
-  const auto curves = table.blobs.find("curve");
-  if (curves == table.blobs.end()) throw std::runtime_error("blob column curve is missing");
   for (std::size_t i = 0; i < samples.size(); ++i) {
     samples[i].sample = static_cast<std::size_t>(positions[i]);
-    const auto& bytes = curves->second[i];
-    samples[i].curve.resize(bytes.size() / sizeof(double));
-    std::memcpy(samples[i].curve.data(), bytes.data(), samples[i].curve.size() * sizeof(double));
   }
+  if (table.blobs.count("curve") == 0) throw std::runtime_error("blob column curve is missing");
+  read_curves(table, "curve", samples, &RefinedSample::curve);
+  read_curves(table, "held_out_curve", samples, &RefinedSample::held_out_curve);
   read_bodies(table, samples);
   return samples;
+}
+
+Table to_table(const std::vector<MeasuredLabel>& labels) {
+  Table table;
+  table.rows = static_cast<std::int64_t>(labels.size());
+  std::vector<std::int64_t> positions;
+  std::vector<std::int32_t> visible;
+  for (const MeasuredLabel& label : labels) {
+    positions.push_back(static_cast<std::int64_t>(label.sample));
+    visible.push_back(label.measures.visible);
+  }
+  table.add<std::int64_t>("sample", {}, positions);
+  table.add<std::int32_t>("visible", {}, visible);
+  for (const auto& [name, field] : kMeasureColumns) {
+    std::vector<double> values;
+    for (const MeasuredLabel& label : labels) values.push_back(label.measures.*field);
+    table.add<double>(name, {}, values);
+  }
+  return table;
+}
+
+std::vector<MeasuredLabel> measured_from_table(const Table& table) {
+  std::vector<MeasuredLabel> labels(static_cast<std::size_t>(table.rows));
+  const auto positions = table.column<std::int64_t>("sample");
+  const auto visible = table.column<std::int32_t>("visible");
+  for (std::size_t i = 0; i < labels.size(); ++i) {
+    labels[i].sample = static_cast<std::size_t>(positions[i]);
+    labels[i].measures.visible = visible[i];
+  }
+  for (const auto& [name, field] : kMeasureColumns) {
+    const auto values = table.column<double>(name);
+    for (std::size_t i = 0; i < labels.size(); ++i) labels[i].measures.*field = values[i];
+  }
+  return labels;
 }
 
 }  // namespace q3d::pipeline

@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "filters/guards.h"
 #include "loaders/crop.h"
 #include "manifests/verdict.h"
 #include "pipeline/ingest.h"
@@ -24,9 +25,16 @@ struct PredictedSample {
 
 // What refine knows of one candidate of the middle band.
 struct RefinedSample {
-  std::size_t sample = 0;     // position within the unit
-  std::vector<double> curve;  // L_proj of iterates 0..n, crop units
-  BodyPrediction body;        // the iterate of least L_proj
+  std::size_t sample = 0;              // position within the unit
+  std::vector<double> curve;           // L_proj of iterates 0..n, crop units
+  BodyPrediction body;                 // the iterate of least L_proj, or of least held-out error
+  std::vector<double> held_out_curve;  // the held-out keypoints' error of the same iterates; empty without
+};
+
+// What the guards look at, of one candidate that the fidelity rule keeps.
+struct MeasuredLabel {
+  std::size_t sample = 0;  // position within the unit
+  filters::LabelMeasures measures;
 };
 
 // A decoded picture, as far as later stages need it.
@@ -37,9 +45,10 @@ struct DecodedSample {
   int image_width_px = 0;
   int image_height_px = 0;
   bool has_mask = false;
-  std::vector<std::uint8_t> patch;     // 256 x 256 x 3 RGB: the network's crop
-  double mask_area_px = 0.0;           // of the patch, when asked for; 0 = no silhouette in it
-  std::vector<std::byte> stored_crop;  // encoded; empty when not asked for
+  std::vector<std::uint8_t> patch;       // 256 x 256 x 3 RGB: the network's crop
+  double mask_area_px = 0.0;             // of the patch, when asked for; 0 = no silhouette in it
+  std::vector<std::uint8_t> patch_mask;  // 256 x 256, the patch's silhouette, when asked for; empty without
+  std::vector<std::byte> stored_crop;    // encoded; empty when not asked for
   std::vector<std::byte> stored_mask;
   int stored_side_px = 0;
   std::array<double, 6> stored_from_image{};
@@ -52,8 +61,10 @@ struct UnitWork {
   // Filled from the journal where an earlier run had finished the stage, else by the stage's node.
   std::optional<std::vector<PredictedSample>> predicted;
   std::optional<std::vector<RefinedSample>> refined;
+  std::optional<std::vector<MeasuredLabel>> measured;  // nothing as long as no guard needs it
   bool predicted_before = false;
   bool refined_before = false;
+  bool measured_before = false;
   bool shard_before = false;
 
   std::vector<DecodedSample> decoded;            // by position; freed once the shard is written

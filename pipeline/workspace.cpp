@@ -31,7 +31,7 @@ Workspace::Workspace(const BuildConfig& config, const RunOptions& options)
       threads_(tbb::global_control::max_allowed_parallelism, flow_threads(options.threads)),
       lock_(made(options.out)),
       digests_(options.out / "digests.txt"),
-      assets_(needs_network(config) ? digest_assets(config.network, digests_) : AssetDigests{}),
+      assets_(digest_assets(config, digests_)),
       device_key_(needs_network(config) ? pipeline::device_key(config.network) : std::string()),
       ingest_(pipeline::ingest(config, digests_)) {
   if (options_.quiet) return;

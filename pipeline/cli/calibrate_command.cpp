@@ -5,7 +5,9 @@
 #include <cstdio>
 #include <memory>
 
+#include "manifests/atomic_file.h"
 #include "pipeline/calibrate_run.h"
+#include "pipeline/calibration_figure.h"
 #include "pipeline/cli/commands.h"
 #include "pipeline/progress.h"
 
@@ -16,15 +18,17 @@ struct Arguments {
   std::vector<std::filesystem::path> configs;
   RunOptions run;
   std::filesystem::path write;
+  std::filesystem::path figure;
   bool json = false;
 };
 
-void print_summary(const CalibrationSummary& summary, const std::filesystem::path& written) {
-  const filters::Calibration& result = summary.calibration;
-  fmt::print(stderr, "\ncalibrated in {}: {} of {} candidates have a prediction, {} were adapted\n",
-             human_duration(summary.seconds), summary.judged, summary.candidates, summary.adapted);
-  fmt::print(stderr, "  retained {:.1f} %, refined {:.1f} %, discarded {:.1f} % of the judged\n",
-             100 * result.retained, 100 * result.refined, 100 * (1 - result.retained - result.refined));
+void print_pool(const CalibratedPool& pool) {
+  const filters::Calibration& result = pool.calibration;
+  fmt::print(stderr, "\n{}: {} candidates have a prediction, {} were adapted\n",
+             pool.dataset.empty() ? "all datasets" : pool.dataset, pool.judged, pool.adapted);
+  fmt::print(stderr, "{}", calibration_table(pool));
+  fmt::print(stderr, "  retained {:.1f} %, refined {:.1f} %, discarded {:.1f} %\n", 100 * result.retained,
+             100 * result.refined, 100 * (1 - result.retained - result.refined));
   if (!result.reached) {
     fmt::print(stderr,
                "  warning: too few candidates reach delta = {} to give the refined share that was asked for; "
@@ -32,25 +36,43 @@ void print_summary(const CalibrationSummary& summary, const std::filesystem::pat
                "  the closest. A larger tta.learning_rate or a smaller delta lets more through.\n",
                result.thresholds.delta);
   }
-  fmt::print("\"filter\": {{\"tau_low\": {}, \"tau_high\": {}, \"delta\": {}}}\n", result.thresholds.tau_low,
-             result.thresholds.tau_high, result.thresholds.delta);
-  if (!written.empty()) {
+}
+
+void print_summary(const CalibrationSummary& summary, const Arguments& arguments) {
+  fmt::print(stderr, "\ncalibrated on {} candidates in {}\n", summary.candidates,
+             human_duration(summary.seconds));
+  for (const CalibratedPool& pool : summary.pools) print_pool(pool);
+  fmt::print(stderr, "\n");
+  fmt::print("{}", thresholds_layer(summary));
+  if (!arguments.figure.empty()) fmt::print(stderr, "wrote {}\n", arguments.figure.string());
+  if (!arguments.write.empty()) {
     fmt::print(stderr, "next: quadruped3d build --config <the same> --config {} --out <the same>\n",
-               written.string());
+               arguments.write.string());
   }
 }
 
 nlohmann::ordered_json to_json(const CalibrationSummary& summary) {
-  const filters::Calibration& result = summary.calibration;
-  return {{"tau_low", result.thresholds.tau_low},
-          {"tau_high", result.thresholds.tau_high},
-          {"delta", result.thresholds.delta},
-          {"candidates", summary.candidates},
-          {"judged", summary.judged},
-          {"adapted", summary.adapted},
-          {"retained_share", result.retained},
-          {"refined_share", result.refined},
-          {"reached", result.reached}};
+  nlohmann::ordered_json pools = nlohmann::ordered_json::array();
+  for (const CalibratedPool& pool : summary.pools) {
+    const filters::Calibration& result = pool.calibration;
+    nlohmann::ordered_json curve = nlohmann::ordered_json::array();
+    for (const filters::YieldPoint& point : pool.curve) {
+      curve.push_back({{"tau", point.tau}, {"yield", point.yield}, {"auc", point.auc}});
+    }
+    nlohmann::ordered_json entry = {{"tau_low", result.thresholds.tau_low},
+                                    {"tau_high", result.thresholds.tau_high},
+                                    {"delta", result.thresholds.delta},
+                                    {"judged", pool.judged},
+                                    {"adapted", pool.adapted},
+                                    {"retained_share", result.retained},
+                                    {"refined_share", result.refined},
+                                    {"reached", result.reached},
+                                    {"curve", std::move(curve)}};
+    entry["dataset"] = nullptr;
+    if (!pool.dataset.empty()) entry["dataset"] = pool.dataset;
+    pools.push_back(std::move(entry));
+  }
+  return {{"candidates", summary.candidates}, {"pools", std::move(pools)}};
 }
 
 }  // namespace
@@ -66,24 +88,33 @@ Command add_calibrate(CLI::App& app) {
       ->add_option("-o,--out", arguments->run.out, "output folder; a later build there finds the predictions")
       ->required();
   command->add_option("-w,--write", arguments->write, "write the thresholds as a config layer");
+  command->add_option("-f,--figure", arguments->figure,
+                      "write an SVG of yield and AUC against the threshold");
   command->add_option("-t,--threads", arguments->run.threads, "threads that read and decode (0 = all cores)")
       ->check(CLI::NonNegativeNumber);
   command->add_flag("--json", arguments->json, "print a machine-readable summary on stdout");
   command->add_flag("-q,--quiet", arguments->run.quiet, "no progress");
   command->footer(
       "Examples:\n"
-      "  quadruped3d calibrate --config my.json --out out --write out/thresholds.json\n"
+      "  quadruped3d calibrate --config my.json --out out --write out/thresholds.json --figure "
+      "out/thresholds.svg\n"
       "  quadruped3d build --config my.json --config out/thresholds.json --out out\n"
       "The shares are the config's \"calibrate\": {\"retained\", \"refined\"}; by default those of the "
       "paper\n"
-      "(14K candidates: 5K retained, 4K refined, 5K discarded). delta is taken as given.");
+      "(14K candidates: 5K retained, 4K refined, 5K discarded). delta is taken as given. With "
+      "\"per_dataset\": "
+      "true every\ndataset gets thresholds of its own. Guards that bound labels act after this: they lower "
+      "the shares.");
   return [arguments] {
     const CalibrationSummary summary = calibrate(load_build_config(arguments->configs), arguments->run);
-    if (!arguments->write.empty()) write_thresholds(arguments->write, summary.calibration.thresholds);
+    if (!arguments->write.empty()) write_thresholds(arguments->write, summary);
+    if (!arguments->figure.empty()) {
+      manifests::write_file_atomically(arguments->figure, calibration_figure(summary));
+    }
     if (arguments->json) {
       fmt::print("{}\n", to_json(summary).dump());
     } else {
-      print_summary(summary, arguments->write);
+      print_summary(summary, *arguments);
     }
     return 0;
   };

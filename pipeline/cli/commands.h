@@ -23,5 +23,7 @@ Command add_train(CLI::App& app);
 Command add_evaluate(CLI::App& app);
 Command add_evaluate_labels(CLI::App& app);
 Command add_compare(CLI::App& app);
+Command add_compare_labels(CLI::App& app);
+Command add_config(CLI::App& app);
 
 }  // namespace q3d::pipeline::cli

@@ -37,11 +37,18 @@ int run(int argc, char** argv) {
       "  quadruped3d verify out\n"
       "`quadruped3d COMMAND --help` explains a command by example.");
   const std::vector<std::pair<std::string, cli::Command>> commands = {
-      {"build", cli::add_build(app)},     {"calibrate", cli::add_calibrate(app)},
-      {"verify", cli::add_verify(app)},   {"inspect", cli::add_inspect(app)},
-      {"sample", cli::add_sample(app)},   {"init", cli::add_init(app)},
-      {"train", cli::add_train(app)},     {"evaluate", cli::add_evaluate(app)},
-      {"compare", cli::add_compare(app)}, {"evaluate-labels", cli::add_evaluate_labels(app)},
+      {"build", cli::add_build(app)},
+      {"calibrate", cli::add_calibrate(app)},
+      {"verify", cli::add_verify(app)},
+      {"inspect", cli::add_inspect(app)},
+      {"sample", cli::add_sample(app)},
+      {"init", cli::add_init(app)},
+      {"train", cli::add_train(app)},
+      {"evaluate", cli::add_evaluate(app)},
+      {"compare", cli::add_compare(app)},
+      {"evaluate-labels", cli::add_evaluate_labels(app)},
+      {"compare-labels", cli::add_compare_labels(app)},
+      {"config", cli::add_config(app)},
   };
   try {
     app.parse(argc, argv);

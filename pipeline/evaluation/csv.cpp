@@ -1,6 +1,7 @@
 #include "pipeline/evaluation/csv.h"
 
 #include <algorithm>
+#include <charconv>
 #include <stdexcept>
 
 namespace q3d::pipeline::evaluation {
@@ -90,6 +91,22 @@ std::string csv_line(const CsvRow& fields) {
 
 std::vector<CsvRow> parse_csv(std::string_view text) {
   return CsvParser(text).parse();
+}
+
+std::size_t column_of(const CsvRow& header, const std::string& name) {
+  const auto found = std::find(header.begin(), header.end(), name);
+  if (found == header.end()) throw std::invalid_argument("the column \"" + name + "\" is missing");
+  return static_cast<std::size_t>(found - header.begin());
+}
+
+std::optional<double> number_of(const std::string& field) {
+  if (field.empty()) return std::nullopt;
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
+  if (error != std::errc() || end != field.data() + field.size()) {
+    throw std::invalid_argument("got \"" + field + "\", expected a number or nothing");
+  }
+  return value;
 }
 
 }  // namespace q3d::pipeline::evaluation

@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <charconv>
 #include <stdexcept>
 
 #include "manifests/atomic_file.h"
@@ -16,37 +14,14 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-std::optional<double> parse_number(const std::string& text) {
-  if (text.empty()) return std::nullopt;
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size()) {
-    throw std::invalid_argument("got \"" + text + "\", expected a number or nothing");
-  }
-  return value;
-}
-
-// Columns by name, so that a later version may add some.
-class Columns {
- public:
-  explicit Columns(const CsvRow& header) : header_(header) {}
-  std::size_t operator[](const std::string& name) const {
-    const auto found = std::find(header_.begin(), header_.end(), name);
-    if (found == header_.end()) throw std::invalid_argument("the column \"" + name + "\" is missing");
-    return static_cast<std::size_t>(found - header_.begin());
-  }
-
- private:
-  const CsvRow& header_;
-};
-
 void read_samples(const std::vector<CsvRow>& rows, StoredEvaluation& evaluation) {
   if (rows.empty()) throw std::invalid_argument("the file is empty");
-  const Columns columns(rows.front());
-  const std::size_t dataset = columns["dataset"], id = columns["id"], left_out = columns["left_out"],
-                    setting = columns["setting"], normaliser = columns["normaliser"];
+  const CsvRow& header = rows.front();
+  const std::size_t dataset = column_of(header, "dataset"), id = column_of(header, "id"),
+                    left_out = column_of(header, "left_out"), setting = column_of(header, "setting"),
+                    normaliser = column_of(header, "normaliser");
   std::array<std::size_t, kMetricCount> metrics{};
-  for (const MetricInfo& info : kMetrics) metrics[index_of(info.metric)] = columns[info.key];
+  for (const MetricInfo& info : kMetrics) metrics[index_of(info.metric)] = column_of(header, info.key);
   for (std::size_t r = 1; r < rows.size(); ++r) {
     const CsvRow& row = rows[r];
     if (!row[left_out].empty()) continue;
@@ -55,7 +30,7 @@ void read_samples(const std::vector<CsvRow>& rows, StoredEvaluation& evaluation)
       throw std::invalid_argument("the dataset " + row[dataset] + " is not in evaluation.json");
     }
     StoredSample sample{row[id], row[normaliser], {}};
-    for (std::size_t m = 0; m < kMetricCount; ++m) sample.values[m] = parse_number(row[metrics[m]]);
+    for (std::size_t m = 0; m < kMetricCount; ++m) sample.values[m] = number_of(row[metrics[m]]);
     known->second.settings[row[setting]].push_back(std::move(sample));
   }
 }

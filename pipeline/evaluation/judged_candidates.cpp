@@ -25,18 +25,12 @@ struct PublishedVerdict {
   Reason reason = Reason::none;
 };
 
-std::size_t column(const CsvRow& header, const char* name) {
-  const auto found = std::find(header.begin(), header.end(), name);
-  if (found == header.end()) throw std::invalid_argument(fmt::format("the column \"{}\" is missing", name));
-  return static_cast<std::size_t>(found - header.begin());
-}
-
 std::vector<PublishedVerdict> read_verdicts(const fs::path& file) {
   try {
     const std::vector<CsvRow> rows = parse_csv(manifests::read_file(file));
     if (rows.empty()) throw std::invalid_argument("the file is empty");
-    const std::size_t id = column(rows[0], "id"), verdict = column(rows[0], "verdict"),
-                      reason = column(rows[0], "reason");
+    const std::size_t id = column_of(rows[0], "id"), verdict = column_of(rows[0], "verdict"),
+                      reason = column_of(rows[0], "reason");
     std::vector<PublishedVerdict> verdicts;
     for (std::size_t r = 1; r < rows.size(); ++r) {
       verdicts.push_back({rows[r][id], manifests::verdict_from_string(rows[r][verdict]),
@@ -104,7 +98,7 @@ JudgedPool read_judged_pool(const BuildConfig& config, Workspace& workspace) {
   }
   const Ingest& ingest = workspace.ingest();
   const StageKeys keys =
-      stage_keys(config, thresholds(config), ingest, workspace.assets(), workspace.device_key());
+      stage_keys(config, judging_rules(config), ingest, workspace.assets(), workspace.device_key());
   const fs::path folder = version_folder(workspace.out(), config, keys);
   if (!is_published(folder, keys)) {
     throw std::runtime_error(

@@ -4,9 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <random>
 
-#include "manifests/digest.h"
+#include "filters/keypoint_choice.h"
 #include "pipeline/errors.h"
 
 namespace q3d::pipeline::evaluation {
@@ -65,21 +64,11 @@ Plan plan_settings(const SettingOptions& options) {
 
 CropKeypoints hide_keypoints(const CropKeypoints& keypoints, double share, std::uint64_t seed,
                              const std::string& sample_id) {
-  std::vector<std::size_t> visible;
-  for (std::size_t k = 0; k < manifests::kNumKeypoints; ++k) {
-    if (keypoints[3 * k + 2] > 0.0F) visible.push_back(k);
-  }
+  const std::vector<std::size_t> visible = filters::shuffled_visible(keypoints, seed, sample_id);
   // The tolerance keeps 0.7 * 10 at 7.
   const auto shown = static_cast<std::size_t>(std::ceil(share * static_cast<double>(visible.size()) - 1e-9));
-  std::mt19937_64 random(
-      std::stoull(manifests::sha256(fmt::format("{} {}", seed, sample_id)).substr(0, 16), nullptr, 16));
   CropKeypoints result = keypoints;
-  // Fisher-Yates from the front: the first `shown` places are the choice, whatever `shown` is. The
-  // remainder's bias is below 2^-59.
-  for (std::size_t i = 0; i < visible.size(); ++i) {
-    std::swap(visible[i], visible[i + random() % (visible.size() - i)]);
-    if (i >= shown) result[3 * visible[i] + 2] = 0.0F;
-  }
+  for (std::size_t i = shown; i < visible.size(); ++i) result[3 * visible[i] + 2] = 0.0F;
   return result;
 }
 

@@ -130,16 +130,19 @@ std::string run_key(const TrainingConfig& config, const fs::path& out, bool reme
   for (const fs::path& path : {network.initial, network.encoders, network.smal_asset, network.priors}) {
     assets.push_back(path.empty() ? std::string() : digests.digest(path));
   }
-  if (remember) digests.save();
   nlohmann::json phases = nlohmann::json::array();
   for (const PhaseConfig& phase : config.phases) {
     nlohmann::json pools = nlohmann::json::array();
     for (const PoolConfig& pool : phase.pools) {
-      pools.push_back({pool.name, ShardPool(pool.name, pool.shards).size(), pool.weight});
+      nlohmann::json shards = nlohmann::json::array();
+      for (const fs::path& file : ShardPool(pool.name, pool.shards).files())
+        shards.push_back(digests.digest(file));
+      pools.push_back({pool.name, shards, pool.weight});
     }
     phases.push_back({phase.name, phase.objective, phase.steps, phase.ief_iterations, phase.adversarial,
                       phase.learning_rate, phase.warm_up_steps, phase.decay, pools});
   }
+  if (remember) digests.save();
   return manifests::sha256(nlohmann::json{settings, assets, phases}.dump());
 }
 

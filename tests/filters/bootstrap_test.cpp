@@ -112,5 +112,62 @@ TEST(PairedBootstrap, RefusesWhatHasNoMeaning) {
   EXPECT_THROW(paired_bootstrap(two, own_pictures(2), {100, 1.0, 0}), std::invalid_argument);
 }
 
+constexpr double kOut = std::numeric_limits<double>::quiet_NaN();  // not in the set
+
+TEST(BootstrapOfSets, OfEqualSetsIsThePairedOne) {
+  const std::vector<double> differences = two_valued(60);
+  std::vector<double> first(60), second(60);
+  for (std::size_t i = 0; i < 60; ++i) {
+    first[i] = 3.0 * static_cast<double>(i);
+    second[i] = first[i] + differences[i];
+  }
+  const BootstrapInterval paired = paired_bootstrap(differences, own_pictures(60), {2'000, 0.95, 4});
+  const BootstrapInterval of_sets = bootstrap_of_sets(first, second, own_pictures(60), {2'000, 0.95, 4});
+  EXPECT_NEAR(of_sets.mean, paired.mean, 1e-10);
+  EXPECT_NEAR(of_sets.low, paired.low, 1e-10);
+  EXPECT_NEAR(of_sets.high, paired.high, 1e-10);
+}
+
+TEST(BootstrapOfSets, IsTheDifferenceOfTheMembersMeans) {
+  const BootstrapInterval interval = bootstrap_of_sets(
+      std::vector{1.0, kOut, 3.0, kOut}, std::vector{kOut, 5.0, 7.0, kOut}, own_pictures(4), {});
+  EXPECT_DOUBLE_EQ(interval.mean, 4.0);
+  // Over two runs: (1 + 2 + 6) / 3 against 10.
+  const BootstrapInterval runs = bootstrap_of_sets(std::vector{1.0, 2.0, 6.0, kOut},
+                                                   std::vector{kOut, 10.0, 10.0, 10.0}, own_pictures(2), {});
+  EXPECT_DOUBLE_EQ(runs.mean, 7.0);
+}
+
+TEST(BootstrapOfSets, ConstantSetsLeaveNoDoubtThoughTheySometimesAreNotDrawn) {
+  const BootstrapInterval interval =
+      bootstrap_of_sets(std::vector{2.0, 2.0, kOut}, std::vector{kOut, kOut, 5.0}, own_pictures(3), {});
+  EXPECT_DOUBLE_EQ(interval.low, 3.0);
+  EXPECT_DOUBLE_EQ(interval.high, 3.0);
+}
+
+// Two sets of 200 that share no picture, each of deviation 1: their means' difference has the deviation
+// sqrt(2 / 200) = 0.1.
+TEST(BootstrapOfSets, WidthIsThatOfTwoMeans) {
+  std::vector<double> first(400, kOut), second(400, kOut);
+  for (std::size_t i = 0; i < 200; ++i) {
+    first[i] = i % 2 == 0 ? 1.0 : -1.0;
+    second[200 + i] = 0.5 + (i % 2 == 0 ? 1.0 : -1.0);
+  }
+  const BootstrapInterval interval = bootstrap_of_sets(first, second, own_pictures(400), {});
+  EXPECT_DOUBLE_EQ(interval.mean, 0.5);
+  EXPECT_NEAR(interval.low, 0.5 - 0.196, 0.012);
+  EXPECT_NEAR(interval.high, 0.5 + 0.196, 0.012);
+}
+
+TEST(BootstrapOfSets, RefusesEmptySetsAndOtherSizes) {
+  const std::vector<double> two{1.0, 2.0};
+  const std::vector<double> none{kOut, kOut};
+  const std::vector<double> infinite{1.0, std::numeric_limits<double>::infinity()};
+  EXPECT_THROW(bootstrap_of_sets(two, none, own_pictures(2), {}), std::invalid_argument);
+  EXPECT_THROW(bootstrap_of_sets(two, infinite, own_pictures(2), {}), std::invalid_argument);
+  EXPECT_THROW(bootstrap_of_sets(two, std::vector<double>(4, 1.0), own_pictures(2), {}),
+               std::invalid_argument);
+}
+
 }  // namespace
 }  // namespace q3d::filters

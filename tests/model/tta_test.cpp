@@ -168,6 +168,93 @@ TEST_F(Tta, GivesUpWithoutGain) {
   }
 }
 
+// Of every instance's first visible keypoints, `count`.
+std::vector<std::vector<std::int64_t>> first_visible(const torch::Tensor& keypoints, std::size_t count) {
+  std::vector<std::vector<std::int64_t>> chosen(static_cast<std::size_t>(keypoints.size(0)));
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    for (std::int64_t k = 0; k < kKeypoints && chosen[i].size() < count; ++k) {
+      if (keypoints[static_cast<std::int64_t>(i)][k][2].item<double>() > 0) chosen[i].push_back(k);
+    }
+  }
+  return chosen;
+}
+
+// The steps are those of the same sample with the held-out keypoints hidden, and the curves are of all
+// visible ones and of the held-out ones alone.
+TEST_F(Tta, HeldOutKeypointsAreMeasuredAndNotFitted) {
+  const auto held_out = first_visible(samples_->keypoints, 2);
+  std::vector<TtaSchedule> schedules = all(steps(6));
+  torch::Tensor hidden = samples_->keypoints.clone();
+  for (std::size_t i = 0; i < held_out.size(); ++i) {
+    for (const std::int64_t k : held_out[i]) {
+      schedules[i].held_out.set(static_cast<std::size_t>(k));
+      hidden[static_cast<std::int64_t>(i)][k][2] = 0.0;
+    }
+  }
+  const TtaResult result = run(samples_->keypoints, schedules);
+  const TtaResult blind = run(hidden, all(steps(6)));
+  expect_near(result.last.rotations, blind.last.rotations, kBatchNoise);
+  for (std::size_t i = 0; i < held_out.size(); ++i) {
+    const auto row = static_cast<std::int64_t>(i);
+    ASSERT_EQ(result.held_out[i].size(), 7U);
+    EXPECT_TRUE(blind.held_out[i].empty());
+    for (std::size_t step = 0; step < 7; ++step) EXPECT_NEAR(result.loss[i][step], blind.loss[i][step], 1e-4);
+    const torch::Tensor keypoints = samples_->keypoints[row];
+    const torch::Tensor error =
+        (result.last.keypoints_2d[row] - keypoints.narrow(1, 0, 2)).abs().sum(1) / 2.0;
+    double of_held_out = 0.0;
+    for (const std::int64_t k : held_out[i]) of_held_out += error[k].item<double>() / 2.0;
+    EXPECT_NEAR(result.held_out[i].back(), of_held_out, 1e-6);
+    const torch::Tensor visible = keypoints.select(1, 2) > 0;
+    EXPECT_NEAR(result.l_proj[i].back(), error.masked_select(visible).mean().item<double>(), 1e-6);
+  }
+}
+
+TEST_F(Tta, TheBestIterateIsThatOfTheHeldOutKeypoints) {
+  const auto held_out = first_visible(samples_->keypoints, 2);
+  std::vector<TtaSchedule> schedules = all(steps(12));
+  for (std::size_t i = 0; i < 3; ++i) {  // the last instance holds out none
+    for (const std::int64_t k : held_out[i]) schedules[i].held_out.set(static_cast<std::size_t>(k));
+  }
+  const TtaResult result = run(samples_->keypoints, schedules);
+  for (std::size_t i = 0; i < 4; ++i) {
+    const std::vector<double>& judged = i < 3 ? result.held_out[i] : result.l_proj[i];
+    const auto least = std::min_element(judged.begin(), judged.end()) - judged.begin();
+    EXPECT_EQ(result.best_iteration[i], least);
+    if (i == 3) continue;
+    const auto row = static_cast<std::int64_t>(i);
+    double error = 0.0;
+    for (const std::int64_t k : held_out[i]) {
+      const torch::Tensor difference =
+          result.best.keypoints_2d[row][k] - samples_->keypoints[row][k].narrow(0, 0, 2);
+      error += difference.abs().mean().item<double>() / 2.0;
+    }
+    EXPECT_NEAR(error, judged[static_cast<std::size_t>(least)], 1e-6);
+  }
+  EXPECT_TRUE(result.held_out[3].empty());
+}
+
+TEST_F(Tta, PatienceEndsWithTheHeldOutError) {
+  const auto held_out = first_visible(samples_->keypoints, 2);
+  std::vector<TtaSchedule> schedules = all(steps(12));
+  for (std::size_t i = 0; i < 4; ++i) {
+    for (const std::int64_t k : held_out[i]) schedules[i].held_out.set(static_cast<std::size_t>(k));
+  }
+  const TtaResult free = run(samples_->keypoints, schedules);
+  for (TtaSchedule& schedule : schedules) schedule.patience = 2;
+  const TtaResult stopped = run(samples_->keypoints, schedules);
+  for (std::size_t i = 0; i < 4; ++i) {
+    std::size_t best = 0;
+    std::size_t end = 0;
+    while (end < 12 && end - best < 2) {
+      ++end;
+      if (free.held_out[i][end] < free.held_out[i][best]) best = end;
+    }
+    EXPECT_EQ(stopped.held_out[i].size(), end + 1) << i;
+    EXPECT_EQ(stopped.best_iteration[i], static_cast<int>(best)) << i;
+  }
+}
+
 TEST_F(Tta, NothingVisibleLeavesTheInstanceAlone) {
   const Prediction before = samples_->prima.predict(samples_->features);
   torch::Tensor keypoints = samples_->keypoints.clone();
@@ -248,6 +335,9 @@ TEST_F(Tta, WrongArgumentsAreRefused) {
   EXPECT_THROW(run(keypoints.narrow(0, 0, 3), all(steps(1))), std::invalid_argument);
   EXPECT_THROW(run(keypoints, {steps(1)}), std::invalid_argument);
   EXPECT_THROW(run(keypoints, all(steps(-1))), std::invalid_argument);
+  TtaSchedule all_held_out = steps(1);
+  all_held_out.held_out.set();
+  EXPECT_THROW(run(keypoints, all(all_held_out)), std::invalid_argument);
   TtaOptions options = fast();
   options.learning_rate = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THROW(adapt(samples_->prima, samples_->features, keypoints, all(steps(1)), options),

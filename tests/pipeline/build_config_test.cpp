@@ -4,7 +4,10 @@
 
 #include <fstream>
 
+#include "pipeline/effective_config.h"
 #include "pipeline/errors.h"
+#include "pipeline/judging_rules.h"
+#include "pipeline/profiles.h"
 #include "tests/support/paths.h"
 
 namespace q3d::pipeline {
@@ -21,8 +24,11 @@ json good() {
     "tta": {"objective": "demo", "learning_rate": 0.001, "aux_weight": 1, "reproj_weight": 2, "iterations_min": 5,
             "iterations_max": 6, "batch": 3},
     "filter": {"tau_low": 0.1, "tau_high": 0.2, "delta": 0.03},
+    "guards": {"visible_min": 5, "iterations_full_at": 12, "held_out_share": 0.25, "held_out_seed": 7,
+               "held_out_patience": 4, "pose_deviation_max": 3, "limb_factor_max": 1.5, "left_right_max": 1.25,
+               "mask_iou_min": 0.4, "priors": "p.safetensors"},
     "shards": {"unit_size": 10, "images": "png", "jpeg_quality": 90, "crop_scale": 2, "crop_min_side_px": 300},
-    "calibrate": {"retained": 0.5, "refined": 0.25}})");
+    "calibrate": {"retained": 0.5, "refined": 0.25, "per_dataset": true}})");
 }
 
 TEST(BuildConfig, ReadsEveryKey) {
@@ -39,7 +45,19 @@ TEST(BuildConfig, ReadsEveryKey) {
   EXPECT_EQ(config.shards.images, "png");
   EXPECT_DOUBLE_EQ(config.shards.crop_scale, 2.0);
   EXPECT_DOUBLE_EQ(config.calibrate.refined, 0.25);
-  const filters::Thresholds limits = thresholds(config);
+  EXPECT_TRUE(config.calibrate.per_dataset);
+  EXPECT_EQ(config.profile, "paper");
+  EXPECT_EQ(config.guards.visible_min, 5);
+  EXPECT_EQ(config.guards.iterations_full_at, 12);
+  EXPECT_DOUBLE_EQ(config.guards.held_out_share, 0.25);
+  EXPECT_EQ(config.guards.held_out_seed, 7U);
+  EXPECT_EQ(config.guards.held_out_patience, 4);
+  EXPECT_DOUBLE_EQ(config.guards.pose_deviation_max, 3.0);
+  EXPECT_DOUBLE_EQ(config.guards.limb_factor_max, 1.5);
+  EXPECT_DOUBLE_EQ(config.guards.left_right_max, 1.25);
+  EXPECT_DOUBLE_EQ(config.guards.mask_iou_min, 0.4);
+  EXPECT_EQ(config.guards.priors, "p.safetensors");
+  const filters::Thresholds limits = judging_rules(config).of("a");
   EXPECT_DOUBLE_EQ(limits.tau_low, 0.1);
   EXPECT_DOUBLE_EQ(limits.tau_high, 0.2);
   EXPECT_DOUBLE_EQ(limits.delta, 0.03);
@@ -59,7 +77,7 @@ TEST_P(BrokenConfig, IsRefusedWithTheReason) {
   json config = good();
   config[json::json_pointer(GetParam().pointer)] = json::parse(GetParam().value);
   try {
-    thresholds(parse_build_config(config, "t"));
+    judging_rules(parse_build_config(config, "t"));
     FAIL() << "accepted " << GetParam().pointer << " = " << GetParam().value;
   } catch (const ConfigError& error) {
     EXPECT_NE(std::string(error.what()).find(GetParam().expected), std::string::npos) << error.what();
@@ -88,7 +106,20 @@ INSTANTIATE_TEST_SUITE_P(
         Mutation{"/shards/images", "\"gif\"", "jpeg, png, reference"},
         Mutation{"/shards/jpeg_quality", "101", "1 to 100"}, Mutation{"/shards/crop_scale", "0.5", "1 to 4"},
         Mutation{"/shards/crop_min_side_px", "100", "256 to 2048"},
-        Mutation{"/calibrate/retained", "0.9", "sum less than 1"}));
+        Mutation{"/calibrate/retained", "0.9", "sum less than 1"},
+        Mutation{"/profile", "\"strit\"", "Did you mean \"strict\"?"},
+        Mutation{"/guards/visible_mn", "1", "did you mean \"visible_min\"?"},
+        Mutation{"/guards/visible_min", "27", "0 <= visible_min <= 26"},
+        Mutation{"/guards/iterations_full_at", "27", "0 (off) to 26"},
+        Mutation{"/guards/held_out_share", "1", "less than 1"},
+        Mutation{"/guards/held_out_patience", "-1", "0 (no limit) or more"},
+        Mutation{"/guards/mask_iou_min", "1.1", "mask_iou_min <= 1"},
+        Mutation{"/guards/limb_factor_max", "-1", "0 <= limb_factor_max"},
+        Mutation{"/filter/datasets", R"({"b": {"tau_low": 0.1, "tau_high": 0.2}})", "Did you mean \"a\"?"},
+        Mutation{"/filter/datasets", R"({"a": {"tau_low": 0.1}})", "belong together"},
+        Mutation{"/filter/datasets", R"({"a": {"tau_hgh": 0.1}})", "did you mean \"tau_high\"?"},
+        Mutation{"/filter/datasets", R"({"a": {"tau_low": 0.3, "tau_high": 0.2}})", "dataset a"},
+        Mutation{"/filter/datasets", "[1]", "a dataset's name for each key"}));
 
 TEST(BuildConfig, OneTauAloneIsRefused) {
   json config = good();
@@ -101,7 +132,7 @@ TEST(BuildConfig, WithoutThresholdsItNamesCalibrate) {
   config.erase("filter");
   const BuildConfig parsed = parse_build_config(config, "t");
   try {
-    thresholds(parsed);
+    judging_rules(parsed);
     FAIL();
   } catch (const ConfigError& error) {
     EXPECT_NE(std::string(error.what()).find("quadruped3d calibrate"), std::string::npos);
@@ -149,6 +180,11 @@ TEST(BuildConfig, TheShippedConfigsOfTheWorldAreSound) {
         << pool;
   }
   EXPECT_TRUE(needs_network(load_build_config({configs / "world_stage2.json"})));
+  const BuildConfig strict =
+      load_build_config({configs / "world_stage2.json", configs / "world_strict.json"});
+  EXPECT_EQ(strict.profile, "strict");
+  EXPECT_GT(strict.guards.held_out_share, 0.0);
+  EXPECT_EQ(strict.guards.priors.parent_path(), std::filesystem::weakly_canonical(configs / "../data/loop"));
 }
 
 TEST(BuildConfig, TwoDatasetsOfOneNameAndSplitAreRefused) {
@@ -184,6 +220,90 @@ TEST(BuildConfig, BrokenJsonNamesTheFile) {
   } catch (const ConfigError& error) {
     EXPECT_NE(std::string(error.what()).find("cut.json: not valid JSON"), std::string::npos) << error.what();
   }
+}
+
+json two_datasets() {
+  json config = good();
+  config["datasets"].push_back(config["datasets"][0]);
+  config["datasets"][1]["name"] = "b";
+  return config;
+}
+
+TEST(JudgingRules, ADatasetsOwnThresholdsComeBeforeTheCommonOnes) {
+  json config = two_datasets();
+  config["filter"]["datasets"]["b"] = {{"tau_low", 0.15}, {"tau_high", 0.5}};
+  JudgingRules rules = judging_rules(parse_build_config(config, "t"));
+  EXPECT_DOUBLE_EQ(rules.of("a").tau_low, 0.1);
+  EXPECT_DOUBLE_EQ(rules.of("b").tau_low, 0.15);
+  EXPECT_DOUBLE_EQ(rules.of("b").tau_high, 0.5);
+  EXPECT_DOUBLE_EQ(rules.of("b").delta, 0.03);
+  config["filter"]["datasets"]["b"] = {{"delta", 0.2}};
+  rules = judging_rules(parse_build_config(config, "t"));
+  EXPECT_DOUBLE_EQ(rules.of("b").tau_low, 0.1);
+  EXPECT_DOUBLE_EQ(rules.of("b").delta, 0.2);
+  EXPECT_DOUBLE_EQ(rules.of("a").delta, 0.03);
+}
+
+TEST(JudgingRules, ADatasetWithoutAnyIsNamed) {
+  json config = two_datasets();
+  config["filter"] = {{"datasets", {{"a", {{"tau_low", 0.1}, {"tau_high", 0.2}}}}}};
+  try {
+    judging_rules(parse_build_config(config, "t"));
+    FAIL();
+  } catch (const ConfigError& error) {
+    const std::string what = error.what();
+    EXPECT_NE(what.find("the dataset b has no thresholds"), std::string::npos) << what;
+    EXPECT_NE(what.find("quadruped3d calibrate"), std::string::npos) << what;
+  }
+  config["datasets"][1]["role"] = "2d_only";  // brings its labels
+  EXPECT_EQ(judging_rules(parse_build_config(config, "t")).thresholds.size(), 1U);
+}
+
+TEST(Profiles, PaperIsTheRuleAloneAndTheDefault) {
+  json config = good();
+  config.erase("guards");
+  const BuildConfig paper = parse_build_config(config, "t");
+  EXPECT_EQ(paper.profile, "paper");
+  EXPECT_FALSE(judging_rules(paper).measures_labels());
+  EXPECT_EQ(paper.guards.iterations_full_at, 0);
+  EXPECT_EQ(paper.guards.held_out_share, 0.0);
+  config["profile"] = "paper";
+  EXPECT_EQ(effective_config(parse_build_config(config, "t")), effective_config(paper));
+}
+
+TEST(Profiles, StrictTurnsEveryGuardOnAndTheConfigIsLaidOverIt) {
+  json config = good();
+  config["profile"] = "strict";
+  config["guards"] = {{"visible_min", 3}, {"mask_iou_min", 0}};
+  const BuildConfig strict = parse_build_config(config, "t");
+  EXPECT_EQ(strict.profile, "strict");
+  EXPECT_EQ(strict.guards.visible_min, 3);
+  EXPECT_EQ(strict.guards.mask_iou_min, 0.0);
+  const json& layer = profile_layer("strict").at("guards");
+  EXPECT_EQ(strict.guards.pose_deviation_max, layer.at("pose_deviation_max").get<double>());
+  for (const char* key : {"visible_min", "iterations_full_at", "held_out_share", "pose_deviation_max",
+                          "limb_factor_max", "left_right_max", "mask_iou_min"}) {
+    EXPECT_GT(layer.at(key).get<double>(), 0.0) << key;
+  }
+}
+
+TEST(EffectiveConfig, SaysEverythingAndReadsAsTheSameConfig) {
+  json config = two_datasets();
+  config["profile"] = "strict";
+  config["filter"]["datasets"]["b"] = {{"delta", 0.2}};
+  const auto effective = effective_config(parse_build_config(config, "t"));
+  EXPECT_EQ(effective["guards"]["visible_min"], 5);
+  EXPECT_EQ(effective["filter"]["datasets"]["b"]["delta"], 0.2);
+  EXPECT_EQ(effective["network"]["batch"], 4);
+  const json again = json::parse(effective.dump());
+  EXPECT_EQ(effective_config(parse_build_config(again, "t")), effective);
+  json small = good();
+  for (const char* key : {"network", "filter", "guards", "tta", "shards", "calibrate"}) small.erase(key);
+  small["datasets"][0]["role"] = "2d_only";
+  const auto defaults = effective_config(parse_build_config(small, "t"));
+  EXPECT_EQ(defaults["guards"]["held_out_share"], 0.0);
+  EXPECT_EQ(defaults["shards"]["unit_size"], 512);
+  EXPECT_FALSE(defaults.contains("network"));
 }
 
 }  // namespace

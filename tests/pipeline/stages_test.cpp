@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <functional>
+#include <vector>
 
 #include "tests/support/paths.h"
 
@@ -11,9 +13,9 @@ namespace {
 
 struct Inputs {
   BuildConfig config;
-  filters::Thresholds limits;
+  JudgingRules rules;
   Ingest ingest;
-  AssetDigests assets{"checkpoint", "asset"};
+  AssetDigests assets{"checkpoint", "asset", ""};
   std::string device = "cpu-2";
 
   Inputs() {
@@ -25,16 +27,22 @@ struct Inputs {
     dataset.annotations = "t";
     ingest.annotation_digests["a/train"] = "digest";
     ingest.units.push_back({0, 0, 1, "unit"});
-    limits.tau_low = 0.1;
-    limits.tau_high = 0.2;
+    limits().tau_low = 0.1;
+    limits().tau_high = 0.2;
   }
-  StageKeys keys() const { return stage_keys(config, limits, ingest, assets, device); }
+  filters::Thresholds& limits() { return rules.thresholds["a"]; }
+  // The guards of the rules are those of the config.
+  void guard(const std::function<void(GuardConfig&)>& change) {
+    change(config.guards);
+    rules.guards = config.guards;
+  }
+  StageKeys keys() const { return stage_keys(config, rules, ingest, assets, device); }
 };
 
 TEST(StageKeys, AChangedTauKeepsPredictionsAndRedoesTheRest) {
   Inputs inputs;
   const StageKeys before = inputs.keys();
-  inputs.limits.tau_low = 0.11;
+  inputs.limits().tau_low = 0.11;
   const StageKeys after = inputs.keys();
   EXPECT_EQ(before.ingest, after.ingest);
   EXPECT_EQ(before.predict, after.predict);
@@ -94,11 +102,63 @@ TEST(StageKeys, WithoutPseudoLabelsNothingOfTheNetworkIsInThem) {
   Inputs other = inputs;
   other.config.network.batch = 3;
   other.config.tta.learning_rate = 3;
-  other.limits.tau_low = 0.15;
+  other.limits().tau_low = 0.15;
   EXPECT_EQ(before.shards, other.keys().shards);
   EXPECT_EQ(before.dataset, other.keys().dataset);
   other.config.shards.jpeg_quality = 50;
   EXPECT_NE(before.shards, other.keys().shards);
+}
+
+TEST(StageKeys, AGuardThatChangesAdaptationRedoesRefinement) {
+  const StageKeys before = Inputs().keys();
+  for (const auto& change :
+       std::vector<std::function<void(GuardConfig&)>>{[](GuardConfig& g) { g.iterations_full_at = 12; },
+                                                      [](GuardConfig& g) { g.held_out_share = 0.2; }}) {
+    Inputs inputs;
+    inputs.guard(change);
+    const StageKeys after = inputs.keys();
+    EXPECT_EQ(before.predict, after.predict);
+    EXPECT_EQ(before.fidelity, after.fidelity);
+    EXPECT_NE(before.refine, after.refine);
+    EXPECT_NE(before.shards, after.shards);
+    EXPECT_EQ(after.measure, "");
+  }
+  Inputs seed;  // of nothing
+  seed.guard([](GuardConfig& g) { g.held_out_seed = 5; });
+  EXPECT_EQ(before.refine, seed.keys().refine);
+}
+
+TEST(StageKeys, AChangedBoundKeepsRefinementsAndMeasures) {
+  const StageKeys none = Inputs().keys();
+  EXPECT_EQ(none.measure, "");
+  Inputs inputs;
+  inputs.guard([](GuardConfig& g) { g.mask_iou_min = 0.5; });
+  const StageKeys before = inputs.keys();
+  EXPECT_EQ(none.refine, before.refine);
+  EXPECT_NE(before.measure, "");
+  EXPECT_NE(none.shards, before.shards);
+  inputs.guard([](GuardConfig& g) { g.mask_iou_min = 0.6; });
+  const StageKeys after = inputs.keys();
+  EXPECT_EQ(before.predict, after.predict);
+  EXPECT_EQ(before.refine, after.refine);
+  EXPECT_EQ(before.measure, after.measure);
+  EXPECT_NE(before.shards, after.shards);
+  inputs.guard([](GuardConfig& g) { g.limb_factor_max = 2.0; });
+  EXPECT_NE(after.measure, inputs.keys().measure) << "more is measured";
+  const StageKeys by_one = inputs.keys();
+  inputs.assets.priors = "other priors";
+  EXPECT_NE(by_one.measure, inputs.keys().measure);
+  EXPECT_EQ(by_one.refine, inputs.keys().refine);
+}
+
+TEST(StageKeys, ThresholdsOfADatasetCount) {
+  Inputs common;
+  common.rules.thresholds["b"] = common.limits();
+  EXPECT_EQ(Inputs().keys().fidelity, common.keys().fidelity) << "the same for all";
+  Inputs own = common;
+  own.rules.thresholds["b"].tau_low = 0.12;
+  EXPECT_NE(common.keys().fidelity, own.keys().fidelity);
+  EXPECT_EQ(common.keys().predict, own.keys().predict);
 }
 
 TEST(StageFolder, RefusesAFolderOfAnotherKey) {

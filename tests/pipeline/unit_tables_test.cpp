@@ -58,15 +58,47 @@ TEST(UnitTables, PredictionsSurviveTheDisk) {
 TEST(UnitTables, RefinementsSurviveTheDiskWithCurvesOfDifferentLengths) {
   const testing::ScratchDir scratch;
   std::vector<RefinedSample> samples = {
-      {4, {0.5, 0.25, 0.125}, numbered(3)}, {9, {0.7}, numbered(7)}, {11, {}, {}}};
+      {4, {0.5, 0.25, 0.125}, numbered(3), {0.6, 0.7, 0.8}}, {9, {0.7}, numbered(7), {}}, {11, {}, {}, {}}};
   manifests::write_table(scratch.path() / "t.h5", to_table(samples));
   const auto back = refined_from_table(manifests::read_table(scratch.path() / "t.h5"));
   ASSERT_EQ(back.size(), samples.size());
   for (std::size_t i = 0; i < samples.size(); ++i) {
     EXPECT_EQ(back[i].sample, samples[i].sample);
     EXPECT_EQ(back[i].curve, samples[i].curve);
+    EXPECT_EQ(back[i].held_out_curve, samples[i].held_out_curve);
     expect_equal(back[i].body, samples[i].body);
   }
+}
+
+TEST(UnitTables, WithoutHeldOutKeypointsThereIsNoColumnOfThem) {
+  const std::vector<RefinedSample> samples{{4, {0.5, 0.25}, numbered(3), {}}};
+  const manifests::Table table = to_table(samples);
+  EXPECT_EQ(table.blobs.count("held_out_curve"), 0U);
+  EXPECT_TRUE(refined_from_table(table)[0].held_out_curve.empty());
+}
+
+TEST(UnitTables, MeasuresSurviveTheDisk) {
+  const testing::ScratchDir scratch;
+  std::vector<MeasuredLabel> labels(2);
+  labels[0].sample = 3;
+  labels[0].measures = {17, 1.25, 0.75, 0.5, 0.875};
+  labels[1].sample = 8;
+  labels[1].measures.visible = 5;  // nothing else could be measured
+  manifests::write_table(scratch.path() / "t.h5", to_table(labels));
+  const auto back = measured_from_table(manifests::read_table(scratch.path() / "t.h5"));
+  ASSERT_EQ(back.size(), 2U);
+  EXPECT_EQ(back[0].sample, 3U);
+  EXPECT_EQ(back[0].measures.visible, 17);
+  EXPECT_EQ(back[0].measures.pose_deviation, 1.25);
+  EXPECT_EQ(back[0].measures.limb_factor, 0.75);
+  EXPECT_EQ(back[0].measures.left_right, 0.5);
+  EXPECT_EQ(back[0].measures.mask_iou, 0.875);
+  EXPECT_EQ(back[1].sample, 8U);
+  EXPECT_EQ(back[1].measures.visible, 5);
+  EXPECT_TRUE(std::isnan(back[1].measures.pose_deviation));
+  EXPECT_TRUE(std::isnan(back[1].measures.mask_iou));
+  manifests::write_table(scratch.path() / "empty.h5", to_table(std::vector<MeasuredLabel>()));
+  EXPECT_TRUE(measured_from_table(manifests::read_table(scratch.path() / "empty.h5")).empty());
 }
 
 TEST(UnitTables, AnEmptyUnitIsATable) {

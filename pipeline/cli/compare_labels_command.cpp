@@ -1,0 +1,80 @@
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <memory>
+#include <stdexcept>
+
+#include "manifests/atomic_file.h"
+#include "pipeline/cli/commands.h"
+#include "pipeline/errors.h"
+#include "pipeline/evaluation/compare_labels.h"
+
+namespace q3d::pipeline::cli {
+namespace {
+
+struct Arguments {
+  std::vector<std::filesystem::path> before;
+  std::vector<std::filesystem::path> after;
+  filters::BootstrapOptions bootstrap;
+  std::filesystem::path out;
+  bool json = false;
+};
+
+std::vector<evaluation::StoredLabels> read_all(const std::vector<std::filesystem::path>& folders) {
+  std::vector<evaluation::StoredLabels> labels;
+  for (const auto& folder : folders) labels.push_back(evaluation::read_label_evaluation(folder));
+  return labels;
+}
+
+int run(const Arguments& arguments) {
+  const auto before = read_all(arguments.before);
+  const auto after = read_all(arguments.after);
+  evaluation::LabelComparison comparison;
+  try {
+    comparison = evaluation::compare_labels(before, after, arguments.bootstrap);
+  } catch (const std::invalid_argument& error) {
+    throw ConfigError(std::string("compare-labels: ") + error.what());
+  }
+  const nlohmann::ordered_json document = evaluation::to_json(comparison, before, after);
+  if (!arguments.out.empty()) manifests::write_file_atomically(arguments.out, document.dump(2) + "\n");
+  std::FILE* const people = arguments.json ? stderr : stdout;
+  fmt::print(people, "{}", evaluation::summary_text(comparison));
+  fmt::print(people,
+             "PA in mm. {} resamples over pictures{}; better or worse where the interval leaves out 0\n",
+             arguments.bootstrap.resamples,
+             comparison.pairs.size() > 1 ? fmt::format(" and {} pairs", comparison.pairs.size()) : "");
+  if (!arguments.out.empty()) fmt::print(people, "wrote {}\n", arguments.out.string());
+  if (arguments.json) fmt::print("{}\n", document.dump());
+  return 0;
+}
+
+}  // namespace
+
+Command add_compare_labels(CLI::App& app) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command =
+      app.add_subcommand("compare-labels", "which rules keep the truer labels, at equal yield?");
+  command->add_option("--before", arguments->before, "folders that `evaluate-labels --report` wrote")
+      ->required()
+      ->check(CLI::ExistingDirectory);
+  command
+      ->add_option("--after", arguments->after,
+                   "as many, of builds over the same pools, in the order of their partners")
+      ->required()
+      ->check(CLI::ExistingDirectory);
+  command->add_option("--resamples", arguments->bootstrap.resamples, "of the bootstrap")
+      ->capture_default_str()
+      ->check(CLI::PositiveNumber);
+  command->add_option("--seed", arguments->bootstrap.seed, "of the bootstrap")->capture_default_str();
+  command->add_option("-o,--out", arguments->out, "write the comparison as JSON");
+  command->add_flag("--json", arguments->json, "print the comparison as JSON on stdout");
+  command->footer(
+      "Examples:\n"
+      "  quadruped3d compare-labels --before out/paper_labels --after out/strict_labels\n"
+      "  quadruped3d compare-labels --before p1 p2 p3 --after s1 s2 s3 --out comparison.json   three seeds\n"
+      "The larger set of labels is cut to the smaller one's size, worst L_proj first. docs/evaluation.md "
+      "shows the\nwhole way from two builds to this command.");
+  return [arguments] { return run(*arguments); };
+}
+
+}  // namespace q3d::pipeline::cli

@@ -1,0 +1,55 @@
+// `compare-labels`: are the labels that one set of rules keeps truer than those of another, at equal yield?
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include <string>
+#include <vector>
+
+#include "filters/bootstrap.h"
+#include "pipeline/evaluation/compare.h"
+#include "pipeline/evaluation/label_files.h"
+
+namespace q3d::pipeline::evaluation {
+
+// One pair of builds over the same pool.
+struct LabelPair {
+  std::int64_t candidates = 0;   // with a prediction
+  std::int64_t kept_before = 0;  // before any cut
+  std::int64_t kept_after = 0;
+  std::int64_t equal = 0;  // labels of each side at equal yield
+  std::int64_t both = 0;   // of them, kept by both
+};
+
+struct LabelComparisonRow {
+  std::string group;  // "equal yield", "kept by both" (of equal yield), "all kept"
+  Metric metric = Metric::pa_mpjpe;
+  std::int64_t samples_before = 0;  // with a value, over all pairs
+  std::int64_t samples_after = 0;
+  double before = 0.0;  // their means
+  double after = 0.0;
+  filters::BootstrapInterval difference;  // after minus before
+  Finding finding = Finding::no_difference_shown;
+};
+
+struct LabelComparison {
+  filters::BootstrapOptions bootstrap;
+  std::vector<LabelPair> pairs;
+  std::vector<LabelComparisonRow> rows;
+};
+
+// before[i] and after[i] are a pair: two builds over one pool. At equal yield, the larger set is cut to the
+// size of the smaller one, those of largest L_proj first (of equal ones, the later id); so the paper's own
+// measure takes the place of the guards. PA-MPJPE and PA-MPVPE; intervals by filters::bootstrap_of_sets over
+// the pool's pictures and the pairs. Throws std::invalid_argument when the lists do not pair and
+// std::runtime_error when the builds of a pair have other candidates or another truth, or no label has a
+// truth.
+LabelComparison compare_labels(const std::vector<StoredLabels>& before,
+                               const std::vector<StoredLabels>& after,
+                               const filters::BootstrapOptions& options);
+
+nlohmann::ordered_json to_json(const LabelComparison& comparison, const std::vector<StoredLabels>& before,
+                               const std::vector<StoredLabels>& after);
+std::string summary_text(const LabelComparison& comparison);
+
+}  // namespace q3d::pipeline::evaluation

@@ -1,0 +1,394 @@
+"""Guards, profiles and thresholds of single datasets on a small rendered world, by an untrained network.
+
+Run by ctest as: python guards_end_to_end.py PATH_OF_quadruped3d. What the guards measure is computed once more in
+numpy and PIL, from the shards and the body model.
+"""
+
+import csv
+import hashlib
+import json
+import pathlib
+import shutil
+import struct
+import subprocess
+import sys
+import tempfile
+import unittest
+import xml.etree.ElementTree
+
+import h5py
+import numpy as np
+from PIL import Image, ImageDraw
+
+PROGRAM = sys.argv[1] if len(sys.argv) > 1 else "build/quadruped3d"
+SIDE = 256
+LEGS = (7, 11, 17, 21)
+# Animal3D's keypoints and their mirror images: eyes, front and back paws, thighs, shoulders, knees, ears, mouth.
+PAIRS = ((0, 1), (3, 4), (5, 6), (8, 9), (10, 11), (12, 13), (14, 15), (16, 17), (20, 21), (22, 23))
+LOOSE = {"visible_min": 1, "pose_deviation_max": 1e6, "limb_factor_max": 1e6, "left_right_max": 1e9,
+         "mask_iou_min": 1e-12, "priors": "priors.safetensors"}
+
+
+def run(*arguments, expect=0):
+    result = subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=600)
+    if result.returncode != expect:
+        raise AssertionError(f"{arguments} ended with {result.returncode}, expected {expect}\n{result.stderr}")
+    return result
+
+
+def read_safetensors(path):
+    content = path.read_bytes()
+    length = struct.unpack("<Q", content[:8])[0]
+    tensors = {}
+    for name, entry in json.loads(content[8 : 8 + length]).items():
+        if name == "__metadata__":
+            continue
+        first, last = entry["data_offsets"]
+        dtype = {"F32": np.float32, "I32": np.int32, "I64": np.int64}[entry["dtype"]]
+        tensors[name] = np.frombuffer(content[8 + length + first : 8 + length + last], dtype).reshape(entry["shape"])
+    return tensors
+
+
+def digests(folder):
+    return {str(p.relative_to(folder)): hashlib.sha256(p.read_bytes()).hexdigest()
+            for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+def axis_angle(rotations):
+    """(35, 3, 3) -> (105). No turn here comes near a half turn, where the axis is hard to tell."""
+    cosine = (np.trace(rotations, axis1=1, axis2=2) - 1) / 2
+    sine_axis = np.stack([rotations[:, 2, 1] - rotations[:, 1, 2], rotations[:, 0, 2] - rotations[:, 2, 0],
+                          rotations[:, 1, 0] - rotations[:, 0, 1]], 1) / 2
+    sine = np.linalg.norm(sine_axis, axis=1)
+    angle = np.arctan2(sine, cosine)
+    return (sine_axis * np.where(sine > 1e-12, angle / np.maximum(sine, 1e-12), 1)[:, None]).reshape(-1)
+
+
+class Body:
+    """Linear blend skinning as in smplx."""
+
+    def __init__(self, asset):
+        self.asset = {name: tensor.astype(float) if tensor.dtype == np.float32 else tensor
+                      for name, tensor in asset.items()}
+
+    def shaped(self, betas):
+        return self.asset["v_template"] + self.asset["shapedirs"] @ betas
+
+    def joints(self, betas):
+        return self.asset["J_regressor"] @ self.shaped(betas)
+
+    def limbs(self, betas):
+        joints = self.joints(betas)
+        spine = sum(np.linalg.norm(joints[i] - joints[i + 1]) for i in range(6))
+        return np.array([np.linalg.norm(joints[first + bone] - joints[first + bone + 1]) / spine
+                         for first in LEGS for bone in range(3)])
+
+    def vertices(self, rotations, betas):
+        rest, parents = self.joints(betas), self.asset["parents"]
+        bent = (rotations[1:] - np.eye(3)).reshape(-1) @ self.asset["posedirs"]
+        transforms = np.zeros((35, 4, 4))
+        for joint in range(35):
+            local = np.eye(4)
+            local[:3, :3] = rotations[joint]
+            local[:3, 3] = rest[joint] - (rest[parents[joint]] if joint else 0)
+            transforms[joint] = transforms[parents[joint]] @ local if joint else local
+        for joint in range(35):
+            transforms[joint, :3, 3] -= transforms[joint, :3, :3] @ rest[joint]
+        skin = np.tensordot(self.asset["lbs_weights"], transforms, 1)
+        posed = self.shaped(betas) + bent.reshape(-1, 3)
+        return np.einsum("vij,vj->vi", skin[:, :3, :3], posed) + skin[:, :3, 3]
+
+    def silhouette(self, sample):
+        points = self.vertices(sample["pose"].astype(float), sample["betas"].astype(float)) + sample["trans"]
+        pixels = 1000 * points[:, :2] / points[:, 2:] + SIDE / 2
+        picture = Image.new("L", (SIDE, SIDE))
+        draw = ImageDraw.Draw(picture)
+        for face in self.asset["faces"]:
+            draw.polygon([tuple(pixels[corner]) for corner in face], fill=255)
+        return np.asarray(picture) > 0
+
+
+class Guards(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.root = pathlib.Path(tempfile.mkdtemp(prefix="q3d_guards_"))
+        cls.world = cls.root / "world"
+        run("sample", "--out", cls.world, "--share", 0.03, "--pixels", 160, "--quiet")
+        run("init", "--size", "tiny", "--seed", 4, "--out", cls.root / "tiny.safetensors", "--priors",
+            cls.root / "priors.safetensors")
+        cls.out = cls.root / "out"
+        cls.config = cls.write("config", name="guarded", datasets=[
+            {"name": "superanimal", "format": "superanimal", "root": "world/superanimal_quadruped",
+             "annotations": "annotations/test.json", "images": "images", "split": "test"},
+            {"name": "animal3d", "format": "prima", "root": "world/animal3d", "annotations": "test.json",
+             "split": "test"}],
+            network={"checkpoint": "tiny.safetensors", "smal_asset": "world/assets/smal_synthetic.safetensors",
+                     "device": "cpu", "compute_threads": 1},
+            tta={"learning_rate": 1e-3, "iterations_max": 14}, shards={"unit_size": 8, "images": "reference"},
+            calibrate={"per_dataset": True})
+        cls.thresholds = cls.root / "thresholds.json"
+        cls.calibrated = run("calibrate", "--config", cls.config, "--out", cls.out, "--write", cls.thresholds, "--figure",
+                             cls.root / "figure.svg", "--quiet")
+        cls.build("paper")
+        cls.build("loose", guards=LOOSE)
+        cls.body = Body(read_safetensors(cls.world / "assets" / "smal_synthetic.safetensors"))
+        cls.priors = read_safetensors(cls.root / "priors.safetensors")
+
+    @classmethod
+    def tearDownClass(cls):
+        shutil.rmtree(cls.root)
+
+    @classmethod
+    def write(cls, name, **config):
+        path = cls.root / f"{name}.json"
+        path.write_text(json.dumps(config))
+        return path
+
+    datasets = {}
+
+    @classmethod
+    def build(cls, layer_name, out=None, threads=0, **layer):
+        path = cls.write(layer_name, **layer)
+        result = run("build", "--config", cls.config, "--config", cls.thresholds, "--config", path, "--out",
+                     out or cls.out, "--threads", threads, "--json", "--quiet")
+        summary = json.loads(result.stdout)
+        folder = pathlib.Path(summary["dataset"])
+        cls.datasets[layer_name] = folder
+        return summary
+
+    @classmethod
+    def stages(cls, stage):
+        return sorted(p.name for p in (cls.out / "stages").glob(f"{stage}-*"))
+
+    @classmethod
+    def verdicts(cls, name):
+        with open(cls.datasets[name] / "verdicts.csv", newline="") as file:
+            return {row["id"]: row for row in csv.DictReader(file)}
+
+    @classmethod
+    def labels(cls, name):
+        """id -> columns of every kept sample."""
+        labels = {}
+        for path in sorted((cls.datasets[name] / "shards").glob("*.h5")):
+            with h5py.File(path) as shard:
+                columns = {key: shard[key][:] for key in
+                           ("pose", "betas", "trans", "projected_2d", "keypoints_px", "keypoints_weight", "patch_box_px")}
+                for row, sample in enumerate(shard["id"][:]):
+                    labels[sample.decode()] = {key: column[row] for key, column in columns.items()}
+        return labels
+
+    @classmethod
+    def measures(cls, name):
+        """id -> measured numbers; the loose build keeps every measured label."""
+        key = json.loads((cls.datasets[name] / "dataset.json").read_text())["provenance"]["stage_keys"]["measure"]
+        ids = list(cls.verdicts(name))
+        measured = {}
+        for unit, path in enumerate(sorted((cls.out / "stages" / f"measure-{key[:12]}").glob("*.h5"))):
+            with h5py.File(path) as table:
+                names = ("visible", "pose_deviation", "limb_factor", "left_right", "mask_iou")
+                for row, sample in enumerate(table["sample"][:]):
+                    measured[ids[8 * unit + sample]] = {key: table[key][row] for key in names}
+        return measured
+
+    # --- what is measured
+
+    def test_measures_are_those_of_the_kept_labels(self):
+        labels, measured = self.labels("loose"), self.measures("loose")
+        kept = {i for i, row in self.verdicts("paper").items() if row["verdict"] in ("retained", "refined")}
+        self.assertEqual(set(measured), kept)
+        self.assertGreater(len(kept), 10)
+        self.assertLessEqual(set(labels), kept)
+        families = np.array([self.body.limbs(betas) for betas in self.priors["shape_prior_loss.mean_betas"].astype(float)])
+        mean, precs, use = (self.priors[f"pose_prior_loss.{name}"].astype(float)
+                            for name in ("mean_pose", "precs", "use_index"))
+        for sample, label in labels.items():
+            numbers = measured[sample]
+            self.assertEqual(numbers["visible"], np.sum(label["keypoints_weight"] > 0))
+            whitened = ((axis_angle(label["pose"].astype(float)) - mean) @ precs) * use
+            self.assertAlmostEqual(numbers["pose_deviation"], np.sqrt(np.sum(whitened**2) / np.sum(use)), delta=1e-3)
+            limbs = self.body.limbs(label["betas"].astype(float))
+            factor = max(np.max(limbs / families.max(0)), np.max(families.min(0) / limbs))
+            self.assertAlmostEqual(numbers["limb_factor"], factor, delta=1e-3)
+
+    def test_left_and_right(self):
+        compared = 0
+        labels, measured = self.labels("loose"), self.measures("loose")
+        for sample, label in labels.items():
+            (x, y), side = label["patch_box_px"][:2], label["patch_box_px"][2]
+            annotated = (label["keypoints_px"] - [x, y]) / side
+            weight, projected = label["keypoints_weight"], label["projected_2d"].astype(float)
+            pairs = [pair for pair in PAIRS if min(weight[list(pair)]) > 0]
+            if not pairs:
+                self.assertTrue(np.isnan(measured[sample]["left_right"]))
+                continue
+            straight = sum(np.abs(projected[k] - annotated[k]).sum() for pair in pairs for k in pair)
+            crossed = sum(np.abs(projected[k] - annotated[m]).sum() for a, b in pairs for k, m in ((a, b), (b, a)))
+            self.assertAlmostEqual(measured[sample]["left_right"] / (straight / crossed), 1, delta=1e-4)
+            compared += 1
+        self.assertGreater(compared, 5)
+
+    def test_mask_overlap(self):
+        with open(self.world / "animal3d" / "test.json") as file:
+            masks = {record["img_path"]: record["mask_path"] for record in json.load(file)["data"]}
+        compared = []
+        labels, measured = self.labels("loose"), self.measures("loose")
+        for sample, numbers in measured.items():
+            dataset, _, picture = sample.split("#")[0].split("/", 2)
+            self.assertEqual(np.isnan(numbers["mask_iou"]), dataset == "superanimal", "that set hides its masks")
+            if dataset == "superanimal" or sample not in labels:
+                continue
+            label = labels[sample]
+            (x, y), side = label["patch_box_px"][:2], label["patch_box_px"][2]
+            scale = side / SIDE
+            mask = Image.open(self.world / "animal3d" / masks[picture]).convert("L").transform(
+                (SIDE, SIDE), Image.Transform.AFFINE, (scale, 0, x - side / 2, 0, scale, y - side / 2),
+                Image.Resampling.BILINEAR)
+            mask, body = np.asarray(mask) >= 128, self.body.silhouette(label)
+            compared.append(np.sum(mask & body) / np.sum(mask | body))
+            self.assertAlmostEqual(numbers["mask_iou"], compared[-1], delta=0.04)
+        self.assertGreater(max(compared), 0.1)
+
+    # --- what is kept
+
+    def test_bounds_decide_by_the_measured_numbers(self):
+        measured = self.measures("loose")
+        bounds = {"pose_deviation_max": float(np.median([m["pose_deviation"] for m in measured.values()])),
+                  "visible_min": int(np.median([m["visible"] for m in measured.values()]))}
+        summary = self.build("bounded", guards=LOOSE | bounds)
+        paper, bounded = self.verdicts("paper"), self.verdicts("bounded")
+        reasons = {"too_few_keypoints": 0, "pose_implausible": 0}
+        for sample, row in bounded.items():
+            if sample not in measured:
+                self.assertEqual(row, paper[sample])
+                continue
+            expected = ""
+            if measured[sample]["visible"] < bounds["visible_min"]:
+                expected = "too_few_keypoints"
+            elif measured[sample]["pose_deviation"] > bounds["pose_deviation_max"]:
+                expected = "pose_implausible"
+            elif measured[sample]["mask_iou"] < 1e-12:
+                expected = "mask_mismatch"
+            if expected:
+                self.assertEqual((row["verdict"], row["reason"]), ("discarded", expected))
+                reasons[expected] = reasons.get(expected, 0) + 1
+            else:
+                self.assertEqual(row["verdict"], paper[sample]["verdict"])
+        self.assertTrue(reasons["too_few_keypoints"] and reasons["pose_implausible"])
+        for reason, count in reasons.items():
+            self.assertEqual(summary["reasons"].get(reason, 0), count)
+        run("verify", self.datasets["bounded"])
+
+    def test_a_changed_bound_makes_shards_alone_anew(self):
+        stages = ("predict", "refine", "measure")
+        before = {stage: self.stages(stage) for stage in stages}
+        files = {stage: digests(self.out / "stages" / before[stage][0]) for stage in stages}
+        self.build("other_bound", guards=LOOSE | {"limb_factor_max": 1.3})
+        self.assertEqual({stage: self.stages(stage) for stage in stages}, before)
+        self.assertEqual({stage: digests(self.out / "stages" / before[stage][0]) for stage in stages}, files)
+        self.assertNotEqual(self.datasets["other_bound"], self.datasets["loose"])
+
+    def test_strict(self):
+        summary = self.build("strict", profile="strict", guards={"priors": "priors.safetensors"})
+        self.assertEqual(len(self.stages("predict")), 1)
+        described = json.loads((self.datasets["strict"] / "dataset.json").read_text())
+        self.assertEqual(described["profile"], "strict")
+        shown = json.loads(run("config", "show").stdout)["profiles"]["strict"]["guards"]
+        self.assertEqual({key: described["guards"][key] for key in shown}, shown)
+        self.assertEqual(described["provenance"]["config"]["profile"], "strict")
+        self.assertEqual(described["provenance"]["priors_sha256"],
+                         hashlib.sha256((self.root / "priors.safetensors").read_bytes()).hexdigest())
+        rows = self.verdicts("strict").values()
+        self.assertEqual(sum(row["verdict"] in ("retained", "refined") for row in rows),
+                         summary["retained"] + summary["refined"])
+        self.assertEqual(summary["retained"] + summary["refined"] + summary["discarded"] + summary["failed"], len(rows))
+        for row in rows:
+            if row["verdict"] == "refined":
+                self.assertGreater(int(row["best_iteration"]), 0, "the kept iterate helps the held-out points")
+        run("verify", self.datasets["strict"])
+        one, two = self.root / "one", self.root / "two"
+        for out, threads in ((one, 1), (two, 4)):
+            self.build("again", out=out, threads=threads, profile="strict", guards={"priors": "priors.safetensors"})
+            self.assertEqual(digests(self.datasets["again"]), digests(self.datasets["strict"]))
+
+    def test_missing_priors_are_named(self):
+        path = self.write("no_priors", guards={"pose_deviation_max": 3})
+        stderr = run("build", "--config", self.config, "--config", self.thresholds, "--config", path, "--out",
+                     self.root / "no_priors", expect=1).stderr
+        self.assertIn("guards.priors", stderr)
+        self.assertIn("pose_prior_loss", stderr)
+
+    # --- thresholds
+
+    def test_each_dataset_has_its_thresholds(self):
+        given = json.loads(self.thresholds.read_text())["filter"]["datasets"]
+        self.assertEqual(set(given), {"animal3d", "superanimal"})
+        self.assertNotEqual(given["animal3d"]["tau_low"], given["superanimal"]["tau_low"])
+        described = json.loads((self.datasets["paper"] / "dataset.json").read_text())
+        self.assertEqual(described["thresholds"], given)
+        self.assertEqual(described["profile"], "paper")
+        for row in self.verdicts("paper").values():
+            if not row["initial_error"]:
+                continue
+            limits = given[row["dataset"]]
+            error = float(row["initial_error"])
+            self.assertEqual(row["verdict"] == "retained", error < limits["tau_low"])
+            self.assertEqual(row["reason"] == "error_too_large", error >= limits["tau_high"])
+
+    def test_a_dataset_without_thresholds_stops_the_build(self):
+        given = json.loads(self.thresholds.read_text())
+        del given["filter"]["datasets"]["superanimal"]
+        path = self.write("half", **given)
+        stderr = run("build", "--config", self.config, "--config", path, "--out", self.root / "half", expect=2).stderr
+        self.assertIn("superanimal has no thresholds", stderr)
+        self.assertIn("calibrate", stderr)
+
+    def test_the_calibration_is_drawn_and_printed(self):
+        figure = xml.etree.ElementTree.parse(self.root / "figure.svg").getroot()
+        texts = "".join(element.text or "" for element in figure.iter())
+        for words in ("animal3d", "superanimal", "tau_low", "tau_high", "yield"):
+            self.assertIn(words, texts)
+        self.assertEqual(json.loads(self.calibrated.stdout), json.loads(self.thresholds.read_text()))
+        self.assertIn("<- tau_low", self.calibrated.stderr)
+
+    # --- one set of rules against another
+
+    def test_labels_at_equal_yield(self):
+        self.build("few", guards=LOOSE | {"limb_factor_max": float(np.median(
+            [m["limb_factor"] for m in self.measures("loose").values()]))})
+        truth = self.world / "truth" / "superanimal_quadruped_test.json"
+        for name in ("paper", "few"):
+            run("evaluate-labels", "--config", self.config, "--config", self.thresholds, "--config",
+                self.root / f"{name}.json", "--out", self.out, "--truth", truth, "--report", self.root / f"{name}_labels",
+                "--quiet")
+        comparison = json.loads(run("compare-labels", "--before", self.root / "paper_labels", "--after",
+                                    self.root / "few_labels", "--json").stdout)
+        pair = comparison["pairs"][0]
+        self.assertLess(pair["kept_after"], pair["kept_before"])
+        self.assertEqual(pair["equal_yield"], pair["kept_after"])
+
+        def kept(name):
+            with open(self.root / f"{name}_labels" / "labels.csv", newline="") as file:
+                return [row for row in csv.DictReader(file) if row["verdict"] in ("retained", "refined")]
+        before = sorted(kept("paper"), key=lambda row: (float(row["label_l_proj"]), row["id"]))[: pair["equal_yield"]]
+        row = next(r for r in comparison["rows"] if r["group"] == "equal yield" and r["metric"] == "pa_mpvpe_mm")
+        self.assertAlmostEqual(row["before"], np.mean([float(r["label_pa_mpvpe_mm"]) for r in before]), places=6)
+        self.assertAlmostEqual(row["after"], np.mean([float(r["label_pa_mpvpe_mm"]) for r in kept("few")]), places=6)
+        self.assertLessEqual(row["low"], row["difference"])
+        self.assertLessEqual(row["difference"], row["high"])
+        both = next(r for r in comparison["rows"] if r["group"] == "kept by both" and r["metric"] == "pa_mpjpe_mm")
+        self.assertEqual((both["low"], both["high"]), (0, 0), "the labels are the same; the choice differs")
+        run("compare-labels", "--before", self.root / "paper_labels", "--after", self.root / "few_labels",
+            self.root / "few_labels", expect=2)
+
+    def test_the_shown_config_is_the_same_config(self):
+        shown = run("config", "show", "--config", self.config, "--config", self.thresholds, "--config",
+                    self.root / "loose.json").stdout
+        path = self.root / "shown.json"
+        path.write_text(shown)
+        summary = json.loads(run("build", "--config", path, "--out", self.out, "--json", "--quiet").stdout)
+        self.assertTrue(summary["up_to_date"])
+        self.assertEqual(summary["dataset"], str(self.datasets["loose"]))
+
+
+if __name__ == "__main__":
+    unittest.main(argv=[sys.argv[0], *sys.argv[2:]], verbosity=1)
