@@ -3,9 +3,10 @@
 // program; with nothing said there it trains on the whole batch.
 //
 //   exact    the network's losses and AdamW in float64
-//   naive    the same, but each rank divides by its own counts and knows its own features alone
 //   prima    Trainer in float32, with the discriminator
 //   encoders EncoderTrainer in float32
+//   naive_exact, naive_prima, naive_encoders
+//            the same, but each rank divides by its own counts and knows its own features alone
 //   leave    rank 1 ends before the first step
 //   wait     meets nobody, for two seconds
 
@@ -14,6 +15,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <functional>
+#include <string_view>
 
 #include "model/assemble.h"
 #include "model/checkpoint.h"
@@ -69,11 +71,28 @@ TrainingBatch joint_batch(const smal::SmalBody& body) {
   return batch;
 }
 
-TrainingBatch part_of(TrainingBatch batch, const Collective& ranks) {
-  const std::int64_t size = kBatch / ranks.size();
-  for_each(batch, [&](torch::Tensor& tensor) { tensor = tensor.narrow(0, ranks.rank() * size, size); });
+TrainingBatch part_of(TrainingBatch batch, const RankPlace& place) {
+  const std::int64_t size = kBatch / place.size;
+  for_each(batch, [&](torch::Tensor& tensor) { tensor = tensor.narrow(0, place.rank * size, size); });
   return batch;
 }
+
+// What one gets by averaging gradients and nothing else: losses that know of no other rank.
+class Naive : public Collective {
+ public:
+  explicit Naive(std::shared_ptr<const Collective> ranks) : ranks_(std::move(ranks)) {}
+  int rank() const override { return 0; }
+  int size() const override { return 1; }
+  torch::Tensor sum(const torch::Tensor& tensor) const override { return tensor.detach(); }
+  torch::Tensor gather(const torch::Tensor& rows) const override { return rows; }
+  std::unique_ptr<AveragedBackward> averaged_backward(
+      const std::vector<torch::Tensor>& parameters) const override {
+    return ranks_->averaged_backward(parameters);
+  }
+
+ private:
+  std::shared_ptr<const Collective> ranks_;
+};
 
 void append_gradients(smal::NamedTensors& out, const PrimaNet& net) {
   for (const auto& parameter : net.named_parameters()) {
@@ -88,7 +107,7 @@ PrimaConfig still(PrimaConfig config) {
   return config;
 }
 
-smal::NamedTensors exact_steps(const Collective& ranks, bool naive) {
+smal::NamedTensors exact_steps(const RankPlace& place, const Collective& ranks) {
   const Prima prima = testing::parity_prima("A", still(testing::parity_config("A")), torch::kFloat64);
   PrimaNet& net = prima.net();
   net.train();
@@ -98,7 +117,7 @@ smal::NamedTensors exact_steps(const Collective& ranks, bool naive) {
     *tensor = tensor->to(torch::kFloat64);
   }
   TrainingBatch batch =
-      part_of(joint_batch(smal::SmalBody(testing::load_parity_asset(testing::parity_dir()))), ranks);
+      part_of(joint_batch(smal::SmalBody(testing::load_parity_asset(testing::parity_dir()))), place);
   for_each(batch, [](torch::Tensor& tensor) {
     if (tensor.is_floating_point()) tensor = tensor.to(torch::kFloat64);
   });
@@ -113,8 +132,7 @@ smal::NamedTensors exact_steps(const Collective& ranks, bool naive) {
     const DecoderOutput decoded = net.decoder().refine(net.decoder().remember(features.image_tokens), betas,
                                                        net.decoder().own_parameters());
     const Prediction prediction = assemble(net, prima.body(), decoded, betas, /*with_vertices=*/false);
-    const LossTerms terms = naive ? loss_terms(prediction, batch.targets, priors, LossVariant::sound)
-                                  : loss_terms(prediction, batch.targets, priors, LossVariant::sound, ranks);
+    const LossTerms terms = loss_terms(prediction, batch.targets, priors, LossVariant::sound, ranks);
     backward->run(total_loss(terms, {}));
     if (step == 0) append_gradients(out, net);
     optimiser.step(kRate);
@@ -126,8 +144,8 @@ smal::NamedTensors exact_steps(const Collective& ranks, bool naive) {
   return out;
 }
 
-smal::NamedTensors learner_steps(const std::shared_ptr<const Collective>& ranks, bool encoders,
-                                 const std::filesystem::path& scratch) {
+smal::NamedTensors learner_steps(const RankPlace& place, const std::shared_ptr<const Collective>& ranks,
+                                 bool encoders, const std::filesystem::path& scratch) {
   PrimaConfig config = still(named_config("tiny"));
   config.embed_dim = 32, config.heads = 2;
   config.clip_width = 32, config.clip_layers = 1, config.clip_heads = 2, config.clip_out = 16;
@@ -153,7 +171,7 @@ smal::NamedTensors learner_steps(const std::shared_ptr<const Collective>& ranks,
     learner = std::make_unique<Trainer>(
         net, body, load_priors(testing::parity_file("weights_A"), torch::kCPU), options, ranks);
   }
-  const TrainingBatch batch = part_of(joint_batch(body), *ranks);
+  const TrainingBatch batch = part_of(joint_batch(body), place);
   for (int step = 0; step < kSteps; ++step) {
     const StepReport report = learner->step(batch);
     std::vector<double> numbers{report.loss, report.gradient_norm};
@@ -168,16 +186,21 @@ smal::NamedTensors learner_steps(const std::shared_ptr<const Collective>& ranks,
   return out;
 }
 
-int run(const std::string& mode, const std::string& out) {
+int run(std::string mode, const std::string& out) {
   configure_compute(1);
   RankPlace place = rank_place_from_environment();
   if (mode == "wait") place.join_timeout = std::chrono::seconds(2);
-  const auto ranks = join_ranks(place, torch::kCPU);
-  const std::string path = fmt::format("{}.{}", out, ranks->rank());
-  if (mode == "leave" && ranks->rank() == 1) return 0;
-  const bool exact = mode == "exact" || mode == "naive" || mode == "leave";
-  smal::write_safetensors(path, exact ? exact_steps(*ranks, mode == "naive")
-                                      : learner_steps(ranks, mode == "encoders", path + ".initial"));
+  auto ranks = join_ranks(place, torch::kCPU);
+  if (mode == "leave" && place.rank == 1) return 0;
+  constexpr std::string_view kNaive = "naive_";
+  if (mode.starts_with(kNaive)) {
+    mode.erase(0, kNaive.size());
+    ranks = std::make_shared<Naive>(ranks);
+  }
+  const std::string path = fmt::format("{}.{}", out, place.rank);
+  smal::write_safetensors(path, mode == "exact" || mode == "leave"
+                                    ? exact_steps(place, *ranks)
+                                    : learner_steps(place, ranks, mode == "encoders", path + ".initial"));
   return 0;
 }
 

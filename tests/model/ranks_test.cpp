@@ -154,7 +154,7 @@ TEST_F(Ranks, TwoEqualOneOnTheJointBatch) {
   EXPECT_LT(worst_error(one[0], two[0], "weight.", "start."), 1e-5);
   expect_equal_ranks(two, "weight.");
   // The tolerance can tell: plain averages of what each rank would compute alone are far off.
-  const auto naive = results("naive", 2);
+  const auto naive = results("naive_exact", 2);
   EXPECT_GT(worst_error(one[0], naive[0], "gradient."), 1e-2);
   EXPECT_GT(worst_error(one[0], naive[0], "weight.", "start."), 1e-2);
 }
@@ -163,7 +163,8 @@ TEST_F(Ranks, ThreeEqualOneToo) {
   EXPECT_LT(worst_error(results("exact", 1)[0], results("exact", 3)[0], "gradient."), 1e-5);
 }
 
-// Float32 adds in another order; AdamW then moves elements whose gradient is mere rounding by whole steps.
+// Float32 adds in another order, so a difference of 1e-8 of the whole gradient, less than its machine
+// epsilon, says nothing. AdamW then moves elements whose gradient is mere rounding by whole steps.
 class Float32Ranks : public Ranks, public ::testing::WithParamInterface<const char*> {};
 
 TEST_P(Float32Ranks, TwoReportAndMoveAsOne) {
@@ -173,10 +174,12 @@ TEST_P(Float32Ranks, TwoReportAndMoveAsOne) {
   ASSERT_EQ(expected.sizes(), got.sizes());
   ASSERT_GE(expected.size(0), 7);
   EXPECT_LT(((expected - got).abs() / expected.abs().clamp_min(1e-6)).max().item<double>(), 1e-5);
-  EXPECT_LT(worst_error(one[0], two[0], "gradient."), 1e-3);
+  EXPECT_LT(worst_error(one[0], two[0], "gradient.", "", /*least=*/1e-4), 1e-4);
   EXPECT_LT(worst_error(one[0], two[0], "weight.", "start.", /*least=*/0.01), 0.05);
   expect_equal_ranks(two, "weight.");
   expect_equal_ranks(two, "report.");
+  const auto naive = results(std::string("naive_") + GetParam(), 2);
+  EXPECT_GT(worst_error(one[0], naive[0], "gradient.", "", /*least=*/1e-4), 1e-2);
 }
 
 INSTANTIATE_TEST_SUITE_P(Learners, Float32Ranks, ::testing::Values("prima", "encoders"));
