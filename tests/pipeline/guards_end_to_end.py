@@ -18,7 +18,7 @@ import xml.etree.ElementTree
 
 import h5py
 import numpy as np
-from PIL import Image, ImageDraw
+from PIL import Image
 
 PROGRAM = sys.argv[1] if len(sys.argv) > 1 else "build/quadruped3d"
 SIDE = 256
@@ -101,11 +101,17 @@ class Body:
     def silhouette(self, sample):
         points = self.vertices(sample["pose"].astype(float), sample["betas"].astype(float)) + sample["trans"]
         pixels = 1000 * points[:, :2] / points[:, 2:] + SIDE / 2
-        picture = Image.new("L", (SIDE, SIDE))
-        draw = ImageDraw.Draw(picture)
-        for face in self.asset["faces"]:
-            draw.polygon([tuple(pixels[corner]) for corner in face], fill=255)
-        return np.asarray(picture) > 0
+        picture = np.zeros((SIDE, SIDE), bool)
+        for a, b, c in pixels[self.asset["faces"]]:
+            first = np.maximum(np.ceil(np.minimum(np.minimum(a, b), c)), 0).astype(int)
+            last = np.minimum(np.floor(np.maximum(np.maximum(a, b), c)), SIDE - 1).astype(int)
+            if np.any(last < first):
+                continue
+            x, y = np.meshgrid(np.arange(first[0], last[0] + 1), np.arange(first[1], last[1] + 1))
+            sides = [(q[0] - p[0]) * (y - p[1]) - (q[1] - p[1]) * (x - p[0]) for p, q in ((a, b), (b, c), (c, a))]
+            inside = np.all([side >= 0 for side in sides], 0) | np.all([side <= 0 for side in sides], 0)
+            picture[first[1] : last[1] + 1, first[0] : last[0] + 1] |= inside
+        return picture
 
 
 class Guards(unittest.TestCase):
@@ -139,8 +145,8 @@ class Guards(unittest.TestCase):
         shutil.rmtree(cls.root)
 
     @classmethod
-    def write(cls, name, **config):
-        path = cls.root / f"{name}.json"
+    def write(cls, file_name, **config):
+        path = cls.root / f"{file_name}.json"
         path.write_text(json.dumps(config))
         return path
 
@@ -245,7 +251,7 @@ class Guards(unittest.TestCase):
                 Image.Resampling.BILINEAR)
             mask, body = np.asarray(mask) >= 128, self.body.silhouette(label)
             compared.append(np.sum(mask & body) / np.sum(mask | body))
-            self.assertAlmostEqual(numbers["mask_iou"], compared[-1], delta=0.04)
+            self.assertAlmostEqual(numbers["mask_iou"], compared[-1], delta=0.02)
         self.assertGreater(max(compared), 0.1)
 
     # --- what is kept
@@ -315,7 +321,7 @@ class Guards(unittest.TestCase):
         stderr = run("build", "--config", self.config, "--config", self.thresholds, "--config", path, "--out",
                      self.root / "no_priors", expect=1).stderr
         self.assertIn("guards.priors", stderr)
-        self.assertIn("pose_prior_loss", stderr)
+        self.assertIn("tiny.safetensors: no tensor named", stderr)
 
     # --- thresholds
 

@@ -122,13 +122,14 @@ TEST(LabelFiles, ReadWhatEvaluateLabelsWrites) {
   evaluation.dataset = "v-123";
   evaluation.content_id = "c";
   evaluation.truth_sha256 = {"t"};
-  MeasuredCandidate& kept = evaluation.candidates.emplace_back();
+  evaluation.candidates.resize(2);
+  MeasuredCandidate& kept = evaluation.candidates[0];
   kept.id = "d/train/a, or b#0";
   kept.verdict = manifests::Verdict::refined;
   kept.label.emplace();
   kept.label->annotated[index_of(Metric::l_proj)] = 0.125;
   kept.label->annotated[index_of(Metric::pa_mpvpe)] = 33.5;
-  MeasuredCandidate& left_out = evaluation.candidates.emplace_back();
+  MeasuredCandidate& left_out = evaluation.candidates[1];
   left_out.id = "d/train/c#0";
   left_out.verdict = manifests::Verdict::discarded;
   left_out.reason = manifests::Reason::mask_mismatch;
