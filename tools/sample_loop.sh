@@ -62,9 +62,10 @@ loop() {
   local stage2=(--config configs/world_stage2.json --config "$run/stage2.json")
   [ -f "$run/thresholds.json" ] ||
     "$program" calibrate "${stage2[@]}" --out "$run/stage2" --write "$run/thresholds.json"
-  "$program" build "${stage2[@]}" --config "$run/thresholds.json" --out "$run/stage2"
+  stage2+=(--config "$run/thresholds.json" --config configs/world_deep.json)
+  "$program" build "${stage2[@]}" --out "$run/stage2"
   say "how true the pseudo labels are"
-  "$program" evaluate-labels "${stage2[@]}" --config "$run/thresholds.json" --out "$run/stage2" \
+  "$program" evaluate-labels "${stage2[@]}" --out "$run/stage2" \
     --truth data/world/truth/superanimal_quadruped_train.json --masks data/world --report "$run/labels"
   say "Stage 3: a fresh head on the same encoders, with the pseudo labels in place of the 2D annotations"
   # shellcheck disable=SC2046
