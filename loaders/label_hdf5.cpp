@@ -1,10 +1,13 @@
 // A pandas DataFrame in HDF5, as DataFrame.to_hdf writes it by PyTables. Two layouts:
 //
-// fixed (labels made by hand)                        table (predictions)
-//   <key>/block0_values          (rows, columns)       <key>/table   compound { index,
-//   values_block_0[columns] } <key>/block0_items_levelI    names of level I <key>.attrs["non_index_axes"]
-//   column names, pickled <key>/block0_items_labelI    (columns) into them <key>/axis1 (rows) names, or
-//   axis1_levelI and axis1_labelI
+// fixed, for labels made by hand
+//   <key>/block0_values                  (rows, columns) floats
+//   <key>/block0_items_level0, 1, ...    the names of each level of the columns
+//   <key>/block0_items_label0, 1, ...    (columns) indices into them
+//   <key>/axis1                          (rows) names of pictures, or axis1_levelI and axis1_labelI
+// table, for predictions
+//   <key>/table                          (rows) of { index, values_block_0[columns] }
+//   <key>.attrs["non_index_axes"]        the columns' names, pickled
 //
 // Every claim of the file is checked against its size before memory is taken for it.
 #include <fmt/format.h>

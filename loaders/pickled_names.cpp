@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cstdint>
 #include <map>
@@ -14,11 +15,23 @@
 namespace q3d::loaders {
 namespace {
 
-struct Value;
-using Items = std::shared_ptr<std::vector<Value>>;  // shared, as a pickle's memo shares them
+// The names lie in a tuple in a list in a tuple in a list. Limits keep what a few bytes can claim small: a
+// memo repeats a value for three bytes, and each level of lists costs two.
+constexpr int kDeepest = 4;
+constexpr std::size_t kMaxNames = 8;  // of one column
+constexpr std::size_t kMaxNameBytes = 1000;
+constexpr std::size_t kMaxColumns = 100'000;
+
+struct List;
+using Items = std::shared_ptr<List>;  // shared, as a pickle's memo shares them
 struct Mark {};
 struct Value {
   std::variant<Mark, std::string, std::int64_t, Items> content;
+};
+struct List {
+  std::vector<Value> items;
+  int depth = 1;           // of lists within each other
+  bool is_within = false;  // in another list, and so complete: it cannot come to hold itself
 };
 
 void append_utf8(std::string& text, std::uint32_t code) {
@@ -51,11 +64,11 @@ class Unpickler {
           break;
         case 'l':
         case 't':
-          push({std::make_shared<std::vector<Value>>(pop_to_mark())});
+          push(list_of(pop_to_mark()));
           break;
         case ']':
         case ')':
-          push({std::make_shared<std::vector<Value>>()});
+          push({std::make_shared<List>()});
           break;
         case 'a':
           append();
@@ -124,25 +137,26 @@ class Unpickler {
   }
 
   void append() {
-    Value item = pop();
-    const Value& list = top();
-    const auto* items = std::get_if<Items>(&list.content);
-    // A list within itself would never be freed, nor end.
-    const auto* nested = std::get_if<Items>(&item.content);
-    if (items == nullptr || (nested != nullptr && reaches(**nested, **items)))
-      fail("no list", "a plain list");
-    (*items)->push_back(std::move(item));
+    const Value item = pop();
+    const auto* list = std::get_if<Items>(&top().content);
+    if (list == nullptr) fail("no list", "one to append to");
+    put_into(**list, item);
   }
 
-  // Whether `wanted` is `from` or lies within it. Names lie three lists deep.
-  static bool reaches(const std::vector<Value>& from, const std::vector<Value>& wanted, int depth = 0) {
-    constexpr int kDeepest = 4;
-    if (&from == &wanted || depth > kDeepest) return true;
-    for (const Value& each : from) {
-      const auto* items = std::get_if<Items>(&each.content);
-      if (items != nullptr && reaches(**items, wanted, depth + 1)) return true;
+  Value list_of(const std::vector<Value>& items) const {
+    auto list = std::make_shared<List>();
+    for (const Value& item : items) put_into(*list, item);
+    return {std::move(list)};
+  }
+
+  void put_into(List& list, const Value& item) const {
+    if (const auto* inner = std::get_if<Items>(&item.content)) {
+      (*inner)->is_within = true;
+      list.depth = std::max(list.depth, (*inner)->depth + 1);
     }
-    return false;
+    if (list.is_within) fail("more for a list that lies in another", "lists that are complete before");
+    if (list.depth > kDeepest) fail("deeper lists", fmt::format("at most {} within each other", kDeepest));
+    list.items.push_back(item);
   }
 
   std::int64_t integer(std::string_view text) const {
@@ -191,12 +205,14 @@ std::vector<std::vector<std::string>> read_pickled_columns(std::string_view pick
                                                            const std::string& where) {
   const auto refuse = [&]() -> std::runtime_error {
     return std::runtime_error(
-        fmt::format("{}: got a pickle of another form, expected a list of tuples of column names", where));
+        fmt::format("{}: got a pickle of another form, expected a list of tuples of column names, "
+                    "at most {} names a tuple and {} bytes a name",
+                    where, kMaxNames, kMaxNameBytes));
   };
   const auto items_of = [&](const Value& value) -> const std::vector<Value>& {
     const auto* items = std::get_if<Items>(&value.content);
     if (items == nullptr) throw refuse();
-    return **items;
+    return (*items)->items;
   };
   const Value read = Unpickler(pickle, where).read();
   const std::vector<Value>& axes = items_of(read);
@@ -204,9 +220,10 @@ std::vector<std::vector<std::string>> read_pickled_columns(std::string_view pick
   std::vector<std::vector<std::string>> columns;
   for (const Value& tuple : items_of(items_of(axes[0])[1])) {
     std::vector<std::string>& names = columns.emplace_back();
+    if (columns.size() > kMaxColumns || items_of(tuple).size() > kMaxNames) throw refuse();
     for (const Value& name : items_of(tuple)) {
       const auto* text = std::get_if<std::string>(&name.content);
-      if (text == nullptr) throw refuse();
+      if (text == nullptr || text->size() > kMaxNameBytes) throw refuse();
       names.push_back(*text);
     }
   }

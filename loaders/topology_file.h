@@ -2,13 +2,16 @@
 //
 //   {
 //     "name": "ap10k17",
-//     "about": "where names and map come from",                     (optional)
-//     "keypoints": ["left_eye", "right_eye", "nose", ...],          in the order of the annotation files
-//     "flip_pairs": [["left_eye", "right_eye"], ...],               mirror images; the others are their own
-//     "animal3d26": { "left_eye": "left_eye", "nose": "nose", ... } Animal3D keypoint -> one of "keypoints"
-//     "weights": { "neck": 0 }                                      (optional) factors in [0, 1] on the
-//     weight
+//     "about": "where names and map come from",
+//     "keypoints": ["left_eye", "right_eye", "nose", ...],
+//     "flip_pairs": [["left_eye", "right_eye"], ...],
+//     "animal3d26": { "left_eye": "left_eye", "nose": "nose", ... },
+//     "weights": { "neck": 0 }
 //   }
+//
+// "keypoints" are in the order of the annotation files; "flip_pairs" are mirror images, and what is in none
+// is its own; "animal3d26" gives, for each of the 26 that has one, the keypoint it is taken from; "weights"
+// are factors in [0, 1] on a keypoint's weight, 1 for the others. "about" and "weights" may be left out.
 #pragma once
 
 #include <filesystem>

@@ -242,13 +242,40 @@ TEST(PickledNames, refuses_code_and_other_shapes) {
   };
   EXPECT_THAT(refusal("cos\nsystem\n(Vecho\ntR."),
               HasSubstr("here: byte 1 of its pickle: got the opcode 0x63"));
-  EXPECT_THAT(refusal("(lp0\ng0\na."), HasSubstr("expected a plain list")) << "a list within itself";
+  EXPECT_THAT(refusal("(lp0\ng0\na."), HasSubstr("got more for a list that lies in another"))
+      << "a list within itself";
   EXPECT_THAT(refusal("(lp0\n(I1\n"), HasSubstr("its end"));
   EXPECT_THAT(refusal("a."), HasSubstr("nothing on the stack"));
   EXPECT_THAT(refusal("g7\n."), HasSubstr("the memo 7"));
   EXPECT_THAT(refusal("l."), HasSubstr("no mark"));
   EXPECT_THAT(refusal("(lp0\n."), HasSubstr("a pickle of another form"));
   EXPECT_THAT(refusal("(lp0\n(I1\n(lp1\nI3\natp2\na."), HasSubstr("a pickle of another form"));
+}
+
+// A few bytes that claim much: a million lists within each other, and a name that thousands of tuples repeat.
+TEST(PickledNames, what_a_pickle_can_claim_is_bounded) {
+  const auto refusal = [](const std::string& pickle) -> std::string {
+    try {
+      read_pickled_columns(pickle, "here");
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_THAT(refusal(std::string(1'000'000, '(') + std::string(1'000'000, 'l') + "."),
+              HasSubstr("got deeper lists, expected at most 4"));
+  const auto columns = [](const std::string& name, int names, int tuples) {
+    std::string pickle = "(lp0\n(I1\n(lp1\n(V" + name + "\np2\n";
+    for (int i = 1; i < names; ++i) pickle += "g2\n";
+    pickle += "tp3\na";
+    for (int i = 1; i < tuples; ++i) pickle += "g3\na";
+    return pickle + "tp4\na.";
+  };
+  EXPECT_EQ(read_pickled_columns(columns("snout", 8, 3), "here"),
+            std::vector(3, std::vector<std::string>(8, "snout")));
+  EXPECT_THAT(refusal(columns("snout", 9, 1)), HasSubstr("at most 8 names a tuple"));
+  EXPECT_THAT(refusal(columns(std::string(1001, 'x'), 1, 1)), HasSubstr("1000 bytes a name"));
+  EXPECT_THAT(refusal(columns("snout", 1, 100'001)), HasSubstr("a pickle of another form"));
 }
 
 }  // namespace
