@@ -83,7 +83,7 @@ SampleRecord read_mpii_record(const nlohmann::json& record, std::size_t index, L
 Dataset load_animal_kingdom(const DatasetOptions& options) {
   Loading loading(options, "dataset");
   const nlohmann::json document = read_json_file(loading.file);
-  if (!document.is_array()) return load_coco(document, kingdom(), loading, add_animal);
+  if (!document.is_array()) return load_coco(document, kingdom(), loading, {.add = add_animal});
   std::vector<SampleRecord> records;
   records.reserve(document.size());
   for (std::size_t i = 0; i < document.size(); ++i) {

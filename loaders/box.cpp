@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace q3d::loaders {
@@ -49,7 +50,7 @@ std::optional<BoxProblem> find_box_problem(const Box& box, int width_px, int hei
 BoxVote vote_on_boxes(std::span<const SampleRecord> records) {
   BoxVote vote;
   for (const SampleRecord& record : records) {
-    if (record.failure != Reason::none) continue;
+    if (record.failure != Reason::none || std::isnan(record.box.x_px)) continue;
     const Box corners = box_from_corners(record.box);
     const bool in_order = corners.w_px > 0.0 && corners.h_px > 0.0;
     const bool corners_fit =
@@ -59,6 +60,24 @@ BoxVote vote_on_boxes(std::span<const SampleRecord> records) {
     if (!in_order || (extents_fit && !corners_fit)) ++vote.extents;
   }
   return vote;
+}
+
+std::optional<Box> box_around(std::span<const manifests::Keypoint> keypoints, double margin) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  double left = kInfinity;
+  double top = kInfinity;
+  double right = -kInfinity;
+  double bottom = -kInfinity;
+  for (const manifests::Keypoint& point : keypoints) {
+    if (!(point.weight > 0.0F)) continue;
+    left = std::min(left, point.x_px);
+    right = std::max(right, point.x_px);
+    top = std::min(top, point.y_px);
+    bottom = std::max(bottom, point.y_px);
+  }
+  if (left > right) return std::nullopt;
+  const double added_px = margin * std::max(right - left, bottom - top);
+  return Box{left - added_px, top - added_px, right - left + 2 * added_px, bottom - top + 2 * added_px};
 }
 
 Box box_from_corners(const Box& corners) {

@@ -29,8 +29,13 @@ struct BoxVote {
   bool is_corners() const { return corners > extents; }
 };
 
-// Records whose box holds the four numbers as they stand in the file. Failed records have no say.
+// Records whose box holds the four numbers as they stand in the file. Failed records, and those without a box
+// (NaN), have no say.
 BoxVote vote_on_boxes(std::span<const manifests::SampleRecord> records);
+
+// Around the keypoints of weight > 0, wider by `margin` times its longer side on each side. Nothing when
+// there are none.
+std::optional<manifests::Box> box_around(std::span<const manifests::Keypoint> keypoints, double margin);
 
 // (x1, y1, x2, y2) held as a box -> the box.
 manifests::Box box_from_corners(const manifests::Box& corners);

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
+#include <limits>
 #include <numeric>
 #include <stdexcept>
 #include <unordered_map>
@@ -25,19 +27,32 @@ std::optional<std::int64_t> id_in(const nlohmann::json& object, const char* key)
   return found->get<std::int64_t>();
 }
 
-// The keypoint names of the first category that lists any; empty when none does.
-std::vector<std::string> keypoint_names(const nlohmann::json& document) {
+std::vector<std::string> names_in(const nlohmann::json& category) {
+  std::vector<std::string> names;
+  for (const auto& name : category["keypoints"]) {
+    names.push_back(name.is_string() ? name.get<std::string>() : describe(name));
+  }
+  return names;
+}
+
+// The keypoint names that the categories list; empty when none does.
+std::vector<std::string> keypoint_names(const nlohmann::json& document, const Loading& loading) {
   std::vector<std::string> names;
   const auto categories = document.find("categories");
   if (categories == document.end() || !categories->is_array()) return names;
-  for (const auto& category : *categories) {
+  for (std::size_t i = 0; i < categories->size(); ++i) {
+    const nlohmann::json& category = (*categories)[i];
     const bool lists_any = category.is_object() && category.contains("keypoints") &&
                            category["keypoints"].is_array() && !category["keypoints"].empty();
     if (!lists_any) continue;
-    for (const auto& name : category["keypoints"]) {
-      names.push_back(name.is_string() ? name.get<std::string>() : describe(name));
+    std::vector<std::string> here = names_in(category);
+    if (!names.empty() && here != names) {
+      throw std::runtime_error(
+          fmt::format("{}: categories[{}]: keypoints: got names that differ from an earlier category's, "
+                      "expected one list of keypoints a file",
+                      loading.file.string(), i));
     }
-    break;
+    names = std::move(here);
   }
   return names;
 }
@@ -45,7 +60,7 @@ std::vector<std::string> keypoint_names(const nlohmann::json& document) {
 std::vector<int> order_of(const nlohmann::json& document, const Topology& topology, Loading& loading) {
   std::vector<int> in_order(topology.keypoints.size());
   std::iota(in_order.begin(), in_order.end(), 0);
-  const std::vector<std::string> names = keypoint_names(document);
+  const std::vector<std::string> names = keypoint_names(document, loading);
   if (names.empty()) {
     loading.notes.add(
         fmt::format("no category names its keypoints; taken as {} in its own order", topology.name));
@@ -65,26 +80,40 @@ std::vector<int> order_of(const nlohmann::json& document, const Topology& topolo
 }
 
 struct CocoFile {
-  const nlohmann::json& images;
   const nlohmann::json& annotations;
   const Topology& topology;
   std::vector<int> order;  // place in the file of each keypoint of the topology
-  std::unordered_map<std::int64_t, const nlohmann::json*> image_of_id;
-  bool ids_are_distinct = false;  // of the annotations
+  std::unordered_map<std::int64_t, const nlohmann::json*> image_of_id;  // an object, or a file name alone
+  bool ids_are_distinct = false;                                        // of the annotations
 };
 
+// Returns how many repeat an id: the first of each is taken.
+std::size_t index_images(const nlohmann::json& images, CocoFile& file) {
+  std::size_t repeated = 0;
+  for (const auto& [key, image] : images.items()) {
+    std::optional<std::int64_t> id = id_in(image, "id");
+    if (images.is_object()) {
+      std::int64_t number = 0;
+      const auto [end, error] = std::from_chars(key.data(), key.data() + key.size(), number);
+      id = error == std::errc() && end == key.data() + key.size() ? std::optional(number) : std::nullopt;
+    }
+    if (id && !file.image_of_id.emplace(*id, &image).second) ++repeated;
+  }
+  return repeated;
+}
+
+const nlohmann::json& images_of(const nlohmann::json& document, const Loading& loading) {
+  const bool is_map = document.is_object() && document.contains("images") && document["images"].is_object();
+  return is_map ? document["images"] : array_of(document, "images", loading.file);
+}
+
 CocoFile index_file(const nlohmann::json& document, const Topology& topology, Loading& loading) {
-  CocoFile file{.images = array_of(document, "images", loading.file),
-                .annotations = array_of(document, "annotations", loading.file),
+  const nlohmann::json& images = images_of(document, loading);
+  CocoFile file{.annotations = array_of(document, "annotations", loading.file),
                 .topology = topology,
                 .order = order_of(document, topology, loading),
                 .image_of_id = {}};
-  std::size_t repeated = 0;
-  for (const nlohmann::json& image : file.images) {
-    const auto id = id_in(image, "id");
-    if (id && !file.image_of_id.emplace(*id, &image).second) ++repeated;
-  }
-  if (repeated > 0) {
+  if (const std::size_t repeated = index_images(images, file); repeated > 0) {
     loading.notes.add(fmt::format("images that repeat an id (the first of each is taken): {}", repeated));
   }
   std::unordered_set<std::int64_t> ids;
@@ -113,6 +142,10 @@ void read_image(const CocoFile& file, std::size_t index, Loading& loading, Recor
     set_picture(loading, annotation, "", "image_id", name, sample);
     return;
   }
+  if (found->second->is_string()) {
+    set_picture(loading, annotation, found->second->get<std::string>(), "image_id", name, sample);
+    return;
+  }
   RecordReader image(*found->second, fmt::format("{}: the image of id {}", loading.file.string(), *id),
                      sample);
   set_picture(loading, image, image.text("file_name"), "file_name", name, sample);
@@ -121,32 +154,41 @@ void read_image(const CocoFile& file, std::size_t index, Loading& loading, Recor
   sample.source = image.optional_text("source_dataset");
 }
 
-void read_annotation(const CocoFile& file, std::size_t index, Loading& loading, RecordReader& annotation,
-                     CocoAddition add, SampleRecord& sample) {
+// Returns the box around the keypoints where the annotation has none and the rules allow it; sample.box is
+// then NaN.
+std::optional<manifests::Box> read_annotation(const CocoFile& file, std::size_t index, Loading& loading,
+                                              RecordReader& annotation, const CocoRules& rules,
+                                              SampleRecord& sample) {
   read_image(file, index, loading, annotation, sample);
-  sample.box = annotation.box("bbox");  // the four numbers as they stand
+  const bool makes_box = rules.box_margin && !annotation.has("bbox");
+  if (!makes_box) sample.box = annotation.box("bbox");  // the four numbers as they stand
   const std::vector<manifests::Keypoint> in_file = annotation.keypoints("keypoints", file.order.size());
   std::vector<manifests::Keypoint> points(file.order.size());
   std::transform(file.order.begin(), file.order.end(), points.begin(),
                  [&](int place) { return in_file[static_cast<std::size_t>(place)]; });
+  if (rules.weigh) rules.weigh(points);
   sample.keypoints = to_animal3d(file.topology, points);
-  add(loading, annotation, sample);
+  rules.add(loading, annotation, sample);
   check_visible(annotation, "keypoints", sample);
+  if (!makes_box || annotation.failed()) return std::nullopt;
+  sample.box.x_px = std::numeric_limits<double>::quiet_NaN();
+  return box_around(points, *rules.box_margin);
 }
 
 }  // namespace
 
 Dataset load_coco(const nlohmann::json& document, const Topology& topology, Loading& loading,
-                  CocoAddition add) {
+                  const CocoRules& rules) {
   const CocoFile file = index_file(document, topology, loading);
   std::vector<SampleRecord> records(file.annotations.size());
+  std::vector<std::optional<manifests::Box>> made_boxes(records.size());
   const auto reader_of = [&](std::size_t index) {
     return RecordReader(file.annotations[index],
                         fmt::format("{}: annotations[{}]", loading.file.string(), index), records[index]);
   };
   for (std::size_t i = 0; i < records.size(); ++i) {
     RecordReader reader = reader_of(i);
-    read_annotation(file, i, loading, reader, add, records[i]);
+    made_boxes[i] = read_annotation(file, i, loading, reader, rules, records[i]);
   }
   const BoxVote vote = vote_on_boxes(records);
   if (vote.corners > 0) {
@@ -155,7 +197,15 @@ Dataset load_coco(const nlohmann::json& document, const Topology& topology, Load
         vote.corners, vote.extents, vote.is_corners() ? "x1, y1, x2, y2" : "x, y, width, height"));
   }
   for (std::size_t i = 0; i < records.size(); ++i) {
-    if (vote.is_corners()) records[i].box = box_from_corners(records[i].box);
+    if (made_boxes[i]) {
+      records[i].box = *made_boxes[i];
+      loading.notes.count(fmt::format("no box: made around the keypoints, with a margin of {} of its longer "
+                                      "side",
+                                      *rules.box_margin),
+                          records[i].id);
+    } else if (vote.is_corners()) {
+      records[i].box = box_from_corners(records[i].box);
+    }
     RecordReader reader = reader_of(i);
     check_box(reader, "bbox", records[i]);
   }

@@ -2,7 +2,10 @@
 // ways of writing boxes.
 #pragma once
 
+#include <functional>
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <span>
 
 #include "loaders/formats.h"
 #include "loaders/topology.h"
@@ -10,12 +13,22 @@
 namespace q3d::loaders {
 
 // What a format adds to a sample whose picture, box and 26 keypoints have been read.
-using CocoAddition = void (*)(Loading& loading, RecordReader& annotation, manifests::SampleRecord& sample);
+using CocoAddition =
+    std::function<void(Loading& loading, RecordReader& annotation, manifests::SampleRecord& sample)>;
 
-// All annotations in file order. Keypoints are taken by the names that a category lists, in whatever order.
-// Boxes are read as the majority of the file tells (vote_on_boxes), then checked. Throws std::runtime_error
-// when images or annotations are missing, or the keypoints' names are not the topology's.
+struct CocoRules {
+  CocoAddition add;
+  // Called with an annotation's keypoints in the topology's order, before they become 26.
+  std::function<void(std::span<manifests::Keypoint> keypoints)> weigh{};
+  // Where an annotation has no box: one around its keypoints (box_around). Without a margin it fails.
+  std::optional<double> box_margin{};
+};
+
+// All annotations in file order. Keypoints are taken by the names that the categories list, in whatever
+// order. Boxes are read as the majority of the file tells (vote_on_boxes), then checked. `images` is COCO's
+// list, or an object from id to file name. Throws std::runtime_error when images or annotations are missing,
+// two categories list different keypoints, or their names are not the topology's.
 Dataset load_coco(const nlohmann::json& document, const Topology& topology, Loading& loading,
-                  CocoAddition add);
+                  const CocoRules& rules);
 
 }  // namespace q3d::loaders

@@ -18,8 +18,11 @@ using manifests::Reason;
 using manifests::SampleRecord;
 
 using Parser = Dataset (*)(const DatasetOptions&);
-constexpr std::array<std::pair<const char*, Parser>, 3> kParsers{
-    {{"prima", load_prima}, {"superanimal", load_superanimal}, {"animal_kingdom", load_animal_kingdom}}};
+constexpr std::array<std::pair<const char*, Parser>, 5> kParsers{{{"prima", load_prima},
+                                                                  {"superanimal", load_superanimal},
+                                                                  {"animal_kingdom", load_animal_kingdom},
+                                                                  {"coco", load_coco_labels},
+                                                                  {"deeplabcut", load_deeplabcut}}};
 
 // Name and split are the first two parts of sample ids and must stay tellable from the rest.
 void require_id_part(const std::string& part, const char* option) {
@@ -109,7 +112,9 @@ Dataset finished(Loading& loading, std::vector<SampleRecord> records) {
   note("of these, names for a file that another of them names too (one must be wrong)",
        finder.shared_files());
   note("picture names that differ from the file's in letter case, '+' or .jpeg", finder.found_by_spelling());
-  return {std::move(records), loading.notes.list()};
+  std::vector<std::filesystem::path> files{loading.file};
+  files.insert(files.end(), loading.more_files.begin(), loading.more_files.end());
+  return {std::move(records), loading.notes.list(), std::move(files)};
 }
 
 }  // namespace q3d::loaders

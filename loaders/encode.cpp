@@ -12,8 +12,12 @@ namespace {
 
 std::vector<std::byte> encode(const cv::Mat& picture, const char* extension,
                               const std::vector<int>& parameters) {
-  cv::Mat bgr = picture;
-  if (picture.channels() == 3) cv::cvtColor(picture, bgr, cv::COLOR_RGB2BGR);
+  cv::Mat bgr;  // not a second header of `picture`: cvtColor would turn the caller's pixels
+  if (picture.channels() == 3) {
+    cv::cvtColor(picture, bgr, cv::COLOR_RGB2BGR);
+  } else {
+    bgr = picture;
+  }
   std::vector<std::uint8_t> bytes;
   if (bgr.empty() || !cv::imencode(extension, bgr, bytes, parameters)) {
     throw std::runtime_error(fmt::format("cannot encode a {} x {} picture with {} channels as {}",

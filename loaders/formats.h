@@ -15,13 +15,16 @@ namespace q3d::loaders {
 Dataset load_prima(const DatasetOptions& options);
 Dataset load_superanimal(const DatasetOptions& options);
 Dataset load_animal_kingdom(const DatasetOptions& options);
+Dataset load_coco_labels(const DatasetOptions& options);
+Dataset load_deeplabcut(const DatasetOptions& options);
 
 // What a parser holds while it reads one file.
 struct Loading {
   Loading(const DatasetOptions& dataset_options, const std::filesystem::path& default_images);
 
   const DatasetOptions& options;
-  std::filesystem::path file;  // the annotation file
+  std::filesystem::path file;                       // the annotation file
+  std::vector<std::filesystem::path> more_files{};  // others that were read
   PictureFinder finder;
   Notes notes;
 };

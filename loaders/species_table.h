@@ -111,12 +111,13 @@ inline constexpr std::array<FamilyNames, 6> kFamilies{{{manifests::Family::none,
                                                        {manifests::Family::bovidae, kBovidae},
                                                        {manifests::Family::hippopotamidae, kHippopotamidae}}};
 
-// Words that leave a record of Animal Kingdom out. "Echina" is the dataset's own spelling of echidna.
+// Words that leave a record of Animal Kingdom or AP-10K out. "Echina" is the dataset's own spelling of
+// echidna.
 inline constexpr std::string_view kNotQuadrupeds[] = {
-    "bird",      "eagle",    "primate",  "monkey",  "macaque",  "baboon",  "chimpanzee", "gorilla",
-    "orangutan", "langur",   "lemur",    "gibbon",  "marmoset", "tamarin", "ape",        "human",
-    "kangaroo",  "wallaby",  "platypus", "echidna", "echina",   "bat",     "flying fox", "whale",
-    "dolphin",   "porpoise", "orca",     "seal",    "sea lion", "walrus",  "manatee",    "dugong"};
+    "bird",     "eagle",   "primate",  "monkey",   "macaque", "baboon",  "chimpanzee", "gorilla", "orangutan",
+    "langur",   "lemur",   "gibbon",   "marmoset", "tamarin", "ape",     "alouatta",   "uakari",  "human",
+    "kangaroo", "wallaby", "platypus", "echidna",  "echina",  "bat",     "flying fox", "whale",   "dolphin",
+    "porpoise", "orca",    "seal",     "sea lion", "walrus",  "manatee", "dugong"};
 
 using NamePair = std::pair<std::string_view, std::string_view>;
 

@@ -37,7 +37,7 @@ void add_species(Loading& loading, RecordReader&, SampleRecord& sample) {
 Dataset load_superanimal(const DatasetOptions& options) {
   Loading loading(options, "images");
   const nlohmann::json document = read_json_file(loading.file);
-  return load_coco(document, topology("superanimal_quadruped39"), loading, add_species);
+  return load_coco(document, topology("superanimal_quadruped39"), loading, {.add = add_species});
 }
 
 }  // namespace q3d::loaders

@@ -23,7 +23,8 @@ std::vector<std::string> words(const std::string& text) {
 // `sources` names, for each Animal3D keypoint in turn, the keypoint it is taken from; "-" is none.
 Topology make(const std::string& name, const std::string& keypoints, const Pairs& mirrored,
               const std::string& sources) {
-  Topology made{.name = name, .keypoints = words(keypoints), .flip = {}};
+  Topology made{.name = name, .keypoints = words(keypoints), .flip = {}, .weights = {}};
+  made.weights.assign(made.keypoints.size(), 1.0F);
   made.flip.resize(made.keypoints.size());
   std::iota(made.flip.begin(), made.flip.end(), 0);
   for (const auto& [left, right] : mirrored) {
@@ -103,71 +104,6 @@ Topology animal_kingdom23() {
               "Tail_Mid_Back");
 }
 
-// Names and mirror images: AP-10K. The map is ours, by measured heights: its "shoulder" and "hip" are at
-// elbow and stifle level (our thighs), its "elbow" and "knee" are carpus and hock (our knees), as its README
-// says of hoofed animals. Its "neck" is at the shoulder end, ours at the head end.
-Topology ap10k17() {
-  return make("ap10k17",
-              "left_eye right_eye nose neck root_of_tail left_shoulder left_elbow left_front_paw "
-              "right_shoulder right_elbow right_front_paw left_hip left_knee left_back_paw right_hip "
-              "right_knee right_back_paw",
-              {{0, 1}, {5, 8}, {6, 9}, {7, 10}, {11, 14}, {12, 15}, {13, 16}},
-              "left_eye right_eye - left_front_paw right_front_paw left_back_paw right_back_paw "
-              "root_of_tail left_shoulder right_shoulder left_hip right_hip - - left_elbow right_elbow "
-              "left_knee right_knee neck - - - - - nose -");
-}
-
-// Names: the dataset's README. Map: published by AniMer's author.
-Topology animalpose20_original() {
-  return make("animalpose20_original",
-              "left_eye right_eye nose left_ear right_ear left_front_elbow right_front_elbow "
-              "left_back_elbow right_back_elbow left_front_knee right_front_knee left_back_knee "
-              "right_back_knee left_front_paw right_front_paw left_back_paw right_back_paw throat "
-              "withers tailbase",
-              {{0, 1}, {3, 4}, {5, 6}, {7, 8}, {9, 10}, {11, 12}, {13, 14}, {15, 16}},
-              "left_eye right_eye - left_front_paw right_front_paw left_back_paw right_back_paw "
-              "tailbase left_front_elbow right_front_elbow left_back_elbow right_back_elbow - - "
-              "left_front_knee right_front_knee left_back_knee right_back_knee - - left_ear right_ear - "
-              "- nose -");
-}
-
-// The same keypoints in the order of mmpose's conversion.
-Topology animalpose20_mmpose() {
-  return make("animalpose20_mmpose",
-              "L_Eye R_Eye L_EarBase R_EarBase Nose Throat TailBase Withers L_F_Elbow R_F_Elbow "
-              "L_B_Elbow R_B_Elbow L_F_Knee R_F_Knee L_B_Knee R_B_Knee L_F_Paw R_F_Paw L_B_Paw R_B_Paw",
-              {{0, 1}, {2, 3}, {8, 9}, {10, 11}, {12, 13}, {14, 15}, {16, 17}, {18, 19}},
-              "L_Eye R_Eye - L_F_Paw R_F_Paw L_B_Paw R_B_Paw TailBase L_F_Elbow R_F_Elbow L_B_Elbow "
-              "R_B_Elbow - - L_F_Knee R_F_Knee L_B_Knee R_B_Knee - - L_EarBase R_EarBase - - Nose -");
-}
-
-// Names: StanfordExtra's keypoint definitions (each leg from the paw up). The map is ours, by name.
-Topology stanfordextra24() {
-  return make("stanfordextra24",
-              "left_front_paw left_front_middle left_front_top left_rear_paw left_rear_middle "
-              "left_rear_top right_front_paw right_front_middle right_front_top right_rear_paw "
-              "right_rear_middle right_rear_top tail_start tail_end left_ear_base right_ear_base nose "
-              "chin left_ear_tip right_ear_tip left_eye right_eye withers throat",
-              {{0, 6}, {1, 7}, {2, 8}, {3, 9}, {4, 10}, {5, 11}, {14, 15}, {18, 19}, {20, 21}},
-              "left_eye right_eye chin left_front_paw right_front_paw left_rear_paw right_rear_paw "
-              "tail_start left_front_top right_front_top left_rear_top right_rear_top - - "
-              "left_front_middle right_front_middle left_rear_middle right_rear_middle - tail_end "
-              "left_ear_base right_ear_base - - nose -");
-}
-
-// Names and map: the official code's AcinoSet converter. It sends the shoulders to the shoulders and drops
-// the hips; DeepLabCut's table sends the same shoulders to the front thighs.
-Topology acinoset20() {
-  return make("acinoset20",
-              "nose r_eye l_eye neck_base spine tail_base tail1 tail2 r_shoulder r_front_knee "
-              "r_front_ankle l_shoulder l_front_knee l_front_ankle r_hip r_back_knee r_back_ankle l_hip "
-              "l_back_knee l_back_ankle",
-              {{1, 2}, {8, 11}, {9, 12}, {10, 13}, {14, 17}, {15, 18}, {16, 19}},
-              "l_eye r_eye - l_front_ankle r_front_ankle l_back_ankle r_back_ankle tail_base - - - - "
-              "l_shoulder r_shoulder l_front_knee r_front_knee l_back_knee r_back_knee neck_base tail2 "
-              "- - - - nose tail1");
-}
-
 std::string folded(std::string_view name) {
   const auto first = name.find_first_not_of(" \t");
   if (first == std::string_view::npos) return {};
@@ -179,14 +115,7 @@ std::string folded(std::string_view name) {
 }  // namespace
 
 std::span<const Topology> topologies() {
-  static const std::array<Topology, 8> all{animal3d26(),
-                                           superanimal_quadruped39(),
-                                           animal_kingdom23(),
-                                           ap10k17(),
-                                           animalpose20_original(),
-                                           animalpose20_mmpose(),
-                                           stanfordextra24(),
-                                           acinoset20()};
+  static const std::array<Topology, 3> all{animal3d26(), superanimal_quadruped39(), animal_kingdom23()};
   return all;
 }
 
@@ -230,7 +159,10 @@ manifests::Keypoints to_animal3d(const Topology& topology, std::span<const manif
   }
   manifests::Keypoints mapped{};
   for (std::size_t i = 0; i < mapped.size(); ++i) {
-    if (topology.source[i] >= 0) mapped[i] = keypoints[static_cast<std::size_t>(topology.source[i])];
+    if (topology.source[i] < 0) continue;
+    const auto here = static_cast<std::size_t>(topology.source[i]);
+    mapped[i] = keypoints[here];
+    mapped[i].weight *= topology.weights[here];
   }
   return mapped;
 }

@@ -17,10 +17,11 @@ struct Topology {
   std::vector<std::string> keypoints;                  // in the order of the files
   std::vector<int> flip;                               // index of each keypoint's mirror image
   std::array<int, manifests::kNumKeypoints> source{};  // Animal3D keypoint -> index here, or -1
+  std::vector<float> weights;                          // a factor in [0, 1] on each keypoint's weight
 };
 
-// animal3d26, superanimal_quadruped39, animal_kingdom23, ap10k17, animalpose20_original, animalpose20_mmpose,
-// stanfordextra24, acinoset20.
+// Those of the formats that this program reads without a topology file: animal3d26, superanimal_quadruped39,
+// animal_kingdom23. Any other comes from a file (loaders/topology_file.h).
 std::span<const Topology> topologies();
 
 // Throws std::invalid_argument that lists the known names.
@@ -31,7 +32,8 @@ const Topology& topology(std::string_view name);
 // std::invalid_argument naming the first name that is missing or one too many.
 std::vector<int> order_in_file(const Topology& topology, std::span<const std::string> names_in_file);
 
-// The 26 of Animal3D from a topology's own keypoints (as many as it has); what has no source gets v = 0.
+// The 26 of Animal3D from a topology's own keypoints (as many as it has), each weight times the topology's;
+// what has no source gets v = 0.
 manifests::Keypoints to_animal3d(const Topology& topology, std::span<const manifests::Keypoint> keypoints);
 
 }  // namespace q3d::loaders

@@ -10,7 +10,7 @@ constexpr std::array<std::string_view, 6> kFamilyNames{"none",    "felidae", "ca
                                                        "equidae", "bovidae", "hippopotamidae"};
 static_assert(kFamilyNames.size() == static_cast<std::size_t>(Family::hippopotamidae) + 2);
 
-constexpr std::array<std::string_view, 31> kReasonNames{
+constexpr std::array<std::string_view, 32> kReasonNames{
     "none",
     "box_missing",
     "box_not_finite",
@@ -42,8 +42,9 @@ constexpr std::array<std::string_view, 31> kReasonNames{
     "left_right_swapped",
     "mask_mismatch",
     "vetoed",
+    "in_test_split",
 };
-static_assert(kReasonNames.size() == static_cast<std::size_t>(Reason::vetoed) + 1);
+static_assert(kReasonNames.size() == static_cast<std::size_t>(Reason::in_test_split) + 1);
 
 }  // namespace
 

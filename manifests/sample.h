@@ -89,6 +89,7 @@ enum class Reason : std::uint8_t {
   mask_mismatch,          // the body's silhouette covers too little of the mask, or too much beside it
   // discarded by the user
   vetoed,
+  in_test_split,  // its picture, or a copy of it, is in a test split
 };
 std::string_view to_string(Reason reason);
 Reason reason_from_string(std::string_view name);  // throws std::invalid_argument on an unknown name

@@ -60,8 +60,8 @@ ClipVisual::ClipVisual(const PrimaConfig& config, const Placement& placement) {
   positional_embedding_ =
       register_parameter("positional_embedding", torch::empty({kClipTokens + 1, width}, placement.vector()));
   proj_ = register_parameter("proj", torch::empty({width, config.clip_out}, placement.vector()));
-  conv1_ = register_module("conv1", std::make_shared<PatchConv>(width, kPatchPx, /*padding_px=*/0,
-                                                                /*has_bias=*/false, placement));
+  const Tokeniser::Patches patches{"conv1", kPatchPx, /*padding_px=*/0, /*has_bias=*/false};
+  tokeniser_ = std::make_unique<Tokeniser>(*this, patches, width, config.clip_stem_depth, placement);
   ln_pre_ = register_module("ln_pre", std::make_shared<LayerNorm>(width, kNormEpsilon, placement));
   const auto transformer = register_module("transformer", std::make_shared<torch::nn::Module>());
   const auto blocks = transformer->register_module("resblocks", std::make_shared<torch::nn::Module>());
@@ -73,7 +73,7 @@ ClipVisual::ClipVisual(const PrimaConfig& config, const Placement& placement) {
 }
 
 torch::Tensor ClipVisual::forward(const torch::Tensor& images) const {
-  const torch::Tensor patches = conv1_->forward(images);
+  const torch::Tensor patches = tokeniser_->forward(images);
   const torch::Tensor cls = class_embedding_.expand({images.size(0), 1, -1});
   torch::Tensor x = ln_pre_->forward(torch::cat({cls, patches}, 1) + positional_embedding_);
   for (const auto& block : blocks_) x = block->forward(x);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "model/config.h"
+#include "model/conv_stem.h"
 #include "model/layers.h"
 
 namespace q3d::model {
@@ -26,7 +27,7 @@ class ClipVisual : public torch::nn::Module {
   torch::Tensor class_embedding_;       // (clip_width)
   torch::Tensor positional_embedding_;  // (197, clip_width)
   torch::Tensor proj_;                  // (clip_width, clip_out)
-  std::shared_ptr<PatchConv> conv1_;
+  std::unique_ptr<Tokeniser> tokeniser_;
   std::shared_ptr<LayerNorm> ln_pre_;
   std::vector<std::shared_ptr<ClipBlock>> blocks_;
   std::shared_ptr<LayerNorm> ln_post_;

@@ -9,6 +9,7 @@
 #include <numeric>
 #include <stdexcept>
 #include <string_view>
+#include <tuple>
 #include <variant>
 #include <vector>
 
@@ -20,6 +21,7 @@ using Member = std::variant<std::int64_t PrimaConfig::*, double PrimaConfig::*, 
 struct Field {
   std::string_view key;
   Member member;
+  std::int64_t least = 1;  // of a size
 };
 
 constexpr std::array kFields{
@@ -27,11 +29,13 @@ constexpr std::array kFields{
     Field{"depth", &PrimaConfig::depth},
     Field{"heads", &PrimaConfig::heads},
     Field{"mlp_ratio", &PrimaConfig::mlp_ratio},
+    Field{"stem_depth", &PrimaConfig::stem_depth, 0},
     Field{"clip_width", &PrimaConfig::clip_width},
     Field{"clip_layers", &PrimaConfig::clip_layers},
     Field{"clip_heads", &PrimaConfig::clip_heads},
     Field{"clip_out", &PrimaConfig::clip_out},
     Field{"clip_quick_gelu", &PrimaConfig::clip_quick_gelu},
+    Field{"clip_stem_depth", &PrimaConfig::clip_stem_depth, 0},
     Field{"dec_dim", &PrimaConfig::dec_dim},
     Field{"dec_layers", &PrimaConfig::dec_layers},
     Field{"dec_heads", &PrimaConfig::dec_heads},
@@ -94,11 +98,12 @@ void require_divides(std::string_view part, std::int64_t divisor, std::string_vi
 PrimaConfig named_config(const std::string& name) {
   PrimaConfig config;
   if (name == "vith") return config;
-  if (name == "small") {  // 2.2 M parameters: trains on two CPU cores, 4.5 MB in half precision
-    config.embed_dim = 128, config.depth = 4, config.heads = 4;
-    config.clip_width = 96, config.clip_layers = 2, config.clip_heads = 3, config.clip_out = 96;
+  if (name == "small") {  // trains from scratch on two CPU cores
+    config.embed_dim = 128, config.depth = 2, config.heads = 4, config.stem_depth = 4;
+    config.clip_width = 64, config.clip_layers = 2, config.clip_heads = 2, config.clip_out = 64;
+    config.clip_stem_depth = 2;
     config.dec_dim = 128, config.dec_layers = 3, config.dec_heads = 4, config.dec_ffn = 384;
-    config.drop_path = 0.05;  // four blocks cannot spare half of themselves
+    config.drop_path = 0.05;  // two blocks cannot spare half of themselves
     config.true_token_grid = true;
     return config;
   }
@@ -116,13 +121,21 @@ void check_config(const PrimaConfig& config) {
   constexpr std::int64_t kLargest = 1 << 16;  // far above any real width; keeps products inside 64 bits
   for (const Field& field : kFields) {
     if (const auto* size = std::get_if<std::int64_t PrimaConfig::*>(&field.member)) {
-      require(config.*(*size) >= 1 && config.*(*size) <= kLargest,
-              fmt::format("'{}' = {} lies outside [1, {}]", field.key, config.*(*size), kLargest));
+      require(
+          config.*(*size) >= field.least && config.*(*size) <= kLargest,
+          fmt::format("'{}' = {} lies outside [{}, {}]", field.key, config.*(*size), field.least, kLargest));
     }
   }
   require_divides("heads", config.heads, "embed_dim", config.embed_dim);
   require_divides("clip_heads", config.clip_heads, "clip_width", config.clip_width);
   require_divides("dec_heads", config.dec_heads, "dec_dim", config.dec_dim);
+  // A stem's first maps have a quarter of the width; its group norms take 16 channels together.
+  for (const auto& [key, depth, width] :
+       {std::tuple{"embed_dim", config.stem_depth, config.embed_dim},
+        std::tuple{"clip_width", config.clip_stem_depth, config.clip_width}}) {
+    require(depth == 0 || width % 64 == 0,
+            fmt::format("a stem needs '{}' = {} to be a multiple of 64", key, width));
+  }
   // The position encoding holds a sine and a cosine for each of two axes.
   require(config.dec_dim % 4 == 0, fmt::format("'dec_dim' = {} is no multiple of 4", config.dec_dim));
   // Keypoints are read after every layer but the last, so one layer alone would predict none.

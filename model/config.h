@@ -14,12 +14,15 @@ struct PrimaConfig {
   std::int64_t depth = 32;
   std::int64_t heads = 16;
   std::int64_t mlp_ratio = 4;
+  std::int64_t stem_depth =
+      0;  // 0: the official patch projection; else a convolutional stem (model/conv_stem.h)
   // BioCLIP visual encoder
   std::int64_t clip_width = 768;
   std::int64_t clip_layers = 12;
   std::int64_t clip_heads = 12;
   std::int64_t clip_out = 512;
   bool clip_quick_gelu = false;
+  std::int64_t clip_stem_depth = 0;  // as stem_depth
   // keypoint-aware decoder
   std::int64_t dec_dim = 1280;
   std::int64_t dec_layers = 6;

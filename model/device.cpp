@@ -59,9 +59,14 @@ DeviceChoice cuda_choice(int index) {
           fmt::format("cuda:{} {}", index, cuda_device_name(index)), ""};
 }
 
-// "cuda" -> 0, "cuda:3" -> 3, anything else -> nothing.
-std::optional<int> cuda_index(const std::string& name) {
-  if (name == "cuda") return 0;
+int gpu_of(int local_rank) {
+  const int found = static_cast<int>(torch::cuda::device_count());
+  return found > 0 ? local_rank % found : 0;
+}
+
+// "cuda" -> `otherwise`, "cuda:3" -> 3, anything else -> nothing.
+std::optional<int> cuda_index(const std::string& name, int otherwise) {
+  if (name == "cuda") return otherwise;
   if (name.rfind("cuda:", 0) != 0) return std::nullopt;
   int index = -1;
   const char* end = name.data() + name.size();
@@ -72,17 +77,18 @@ std::optional<int> cuda_index(const std::string& name) {
 
 }  // namespace
 
-DeviceChoice choose_device(const std::string& name) {
+DeviceChoice choose_device(const std::string& name, int local_rank) {
   if (name == "cpu") return cpu_choice();
   if (name == "auto") {
     if (!nvidia_gpu_present() && !torch::cuda::is_available()) return cpu_choice();
-    const auto reason = why_unusable(0);
-    if (!reason) return cuda_choice(0);
+    const int gpu = gpu_of(local_rank);
+    const auto reason = why_unusable(gpu);
+    if (!reason) return cuda_choice(gpu);
     DeviceChoice choice = cpu_choice();
     choice.warning = "a GPU is present but cannot be used, so the CPU is: " + *reason;
     return choice;
   }
-  const auto index = cuda_index(name);
+  const auto index = cuda_index(name, gpu_of(local_rank));
   if (!index) {
     throw std::invalid_argument(
         fmt::format("device '{}' is unknown; use auto, cpu, cuda or cuda:<number>", name));

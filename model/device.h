@@ -13,9 +13,11 @@ struct DeviceChoice {
   std::string warning;      // a GPU that is present but cannot be used, and why; else empty
 };
 
-// "auto" (a usable GPU, else the CPU), "cpu", "cuda", "cuda:I". Throws std::invalid_argument for another word
-// and std::runtime_error when a CUDA device was asked for and cannot be used.
-DeviceChoice choose_device(const std::string& name);
+// "auto" (a usable GPU, else the CPU), "cpu", "cuda", "cuda:I". Of several processes on a machine, numbered
+// by local_rank, "auto" and "cuda" give each the GPU of its number, round and round. Throws
+// std::invalid_argument for another word and std::runtime_error when a CUDA device was asked for and cannot
+// be used.
+DeviceChoice choose_device(const std::string& name, int local_rank = 0);
 
 // Reproducible kernels, and the number of threads a CPU operator may use.
 void configure_compute(int threads);

@@ -9,13 +9,13 @@
 #include "model/init.h"
 #include "model/mixed_precision.h"
 #include "model/module_state.h"
+#include "model/partial_mean.h"
 
 namespace q3d::model {
 namespace {
 
 constexpr const char* kHeads = "training.heads.";
 constexpr const char* kOptimiser = "training.optimiser.";
-constexpr const char* kGenerators = "training.generator.";
 constexpr const char* kSteps = "training.steps";
 
 // The ViT sees columns 32 to 224 of the 256-px crop, in patches of 16 px that begin 2 px before the edge.
@@ -35,21 +35,23 @@ torch::Tensor hat(const torch::Tensor& at, std::int64_t count) {
   return (1.0 - (clamped - centres).abs()).clamp_min(0.0);
 }
 
-torch::Tensor species_loss(const torch::Tensor& logits, const torch::Tensor& species) {
+// Over samples of known species.
+PartialMean species_loss(const torch::Tensor& logits, const torch::Tensor& species) {
   const torch::Tensor known = (species >= 0).to(logits.scalar_type());
   const torch::Tensor log_shares = torch::log_softmax(logits, 1);
   const torch::Tensor chosen = log_shares.gather(1, species.clamp_min(0).unsqueeze(1)).squeeze(1);
-  return -(chosen * known).sum() / known.sum().clamp_min(1.0);
+  return {-(chosen * known).sum(), known.sum()};
 }
 
-torch::Tensor accuracy(const torch::Tensor& logits, const torch::Tensor& species) {
+PartialMean accuracy(const torch::Tensor& logits, const torch::Tensor& species) {
   const torch::Tensor right = logits.argmax(1) == species;  // -1 is never right
-  return right.sum().to(torch::kFloat32) / (species >= 0).sum().clamp_min(1);
+  return {right.sum().to(torch::kFloat32), (species >= 0).sum().to(torch::kFloat32)};
 }
 
-torch::Tensor keypoint_loss(const torch::Tensor& logits, const TokenTargets& targets) {
+// Over keypoints, by their weights.
+PartialMean keypoint_loss(const torch::Tensor& logits, const TokenTargets& targets) {
   const torch::Tensor log_shares = torch::log_softmax(logits, 1).transpose(1, 2);  // (B, 26, 192)
-  return -((log_shares * targets.share).sum(2) * targets.weight).sum() / targets.weight.sum().clamp_min(1.0);
+  return {-((log_shares * targets.share).sum(2) * targets.weight).sum(), targets.weight.sum()};
 }
 
 }  // namespace
@@ -82,8 +84,9 @@ TokenTargets token_targets(const torch::Tensor& keypoints) {
           keypoints.select(2, 2) * inside};
 }
 
-EncoderTrainer::EncoderTrainer(std::shared_ptr<PrimaNet> net, const EncoderTrainerOptions& options)
-    : net_(std::move(net)), options_(options), optimiser_({}, options.adamw) {
+EncoderTrainer::EncoderTrainer(std::shared_ptr<PrimaNet> net, const EncoderTrainerOptions& options,
+                               std::shared_ptr<const Collective> ranks)
+    : net_(std::move(net)), options_(options), ranks_(std::move(ranks)), optimiser_({}, options.adamw) {
   if (net_->placement().matrix_dtype != torch::kFloat32) {
     throw std::invalid_argument("encoder trainer: the network must hold float32 weights");
   }
@@ -102,6 +105,7 @@ EncoderTrainer::EncoderTrainer(std::shared_ptr<PrimaNet> net, const EncoderTrain
     group.parameters.emplace_back(kHeads + parameter.key(), parameter.value());
   }
   optimiser_ = AdamW({group}, options_.adamw);
+  backward_ = ranks_->averaged_backward(optimiser_.parameters());
 }
 
 EncoderTrainer::Outputs EncoderTrainer::predict(const torch::Tensor& images) const {
@@ -121,16 +125,19 @@ StepReport EncoderTrainer::step(const TrainingBatch& batch) {
   }
   optimiser_.zero_grad();
   const Outputs outputs = predict(batch.images.to(device));
-  const torch::Tensor keypoints =
+  PartialMean keypoints =
       keypoint_loss(outputs.keypoint_logits, token_targets(batch.targets.keypoints_2d.to(device)));
-  const torch::Tensor backbone = species_loss(outputs.backbone_species, species);
-  const torch::Tensor bioclip = species_loss(outputs.bioclip_species, species);
-  const torch::Tensor loss = keypoints + backbone + bioclip;
-  loss.backward();
+  PartialMean backbone = species_loss(outputs.backbone_species, species);
+  PartialMean bioclip = species_loss(outputs.bioclip_species, species);
+  PartialMean backbone_accuracy = accuracy(outputs.backbone_species, species);
+  PartialMean bioclip_accuracy = accuracy(outputs.bioclip_species, species);
+  join_means({&keypoints, &backbone, &bioclip, &backbone_accuracy, &bioclip_accuracy}, *ranks_);
+  const torch::Tensor loss = keypoints.value() + backbone.value() + bioclip.value();
+  backward_->run(loss);
   const torch::Tensor norm = optimiser_.gradient_norm();
   const std::vector<double> values =
-      to_host({loss, norm, keypoints, backbone, bioclip, accuracy(outputs.backbone_species, species),
-               accuracy(outputs.bioclip_species, species)});
+      mean_over_ranks(*ranks_, to_host({loss, norm, keypoints.value(), backbone.value(), bioclip.value(),
+                                        backbone_accuracy.value(), bioclip_accuracy.value()}));
   StepReport report;
   report.loss = values[0];
   report.gradient_norm = values[1];
@@ -153,7 +160,6 @@ smal::NamedTensors EncoderTrainer::state() const {
   append_parameters(state, "", *net_);
   append_parameters(state, kHeads, *heads_);
   optimiser_.append_state(state, kOptimiser);
-  append_generators(state, kGenerators, net_->placement().device);
   state.emplace_back(kSteps, torch::tensor(steps_, torch::kInt64));
   return state;
 }
@@ -162,7 +168,6 @@ void EncoderTrainer::restore(const smal::SafeTensors& file) {
   restore_parameters(file, "", *net_);
   restore_parameters(file, kHeads, *heads_);
   optimiser_.restore_state(file, kOptimiser);
-  restore_generators(file, kGenerators, net_->placement().device);
   steps_ = restored_like(file, kSteps, torch::zeros({}, torch::kInt64)).item<std::int64_t>();
 }
 

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <memory>
 
+#include "model/collective.h"
 #include "model/learner.h"
 #include "model/net.h"
 #include "model/optimiser.h"
@@ -35,7 +36,8 @@ class EncoderTrainer : public Learner {
  public:
   // Trains net's encoders and leaves its other parameters alone. Throws std::invalid_argument when the net
   // does not hold float32 or there are fewer than two species.
-  EncoderTrainer(std::shared_ptr<PrimaNet> net, const EncoderTrainerOptions& options);
+  EncoderTrainer(std::shared_ptr<PrimaNet> net, const EncoderTrainerOptions& options,
+                 std::shared_ptr<const Collective> ranks = single_rank());
 
   PrimaNet& net() const override { return *net_; }
   StepReport step(const TrainingBatch& batch) override;
@@ -54,7 +56,9 @@ class EncoderTrainer : public Learner {
   std::shared_ptr<PrimaNet> net_;
   EncoderTrainerOptions options_;
   std::shared_ptr<Heads> heads_;
+  std::shared_ptr<const Collective> ranks_;
   AdamW optimiser_;
+  std::unique_ptr<AveragedBackward> backward_;
   std::int64_t steps_ = 0;
 };
 

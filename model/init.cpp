@@ -40,6 +40,11 @@ bool is_last_of_head(std::string_view name) {
          ends_with(name, "deccam.2.weight") || ends_with(name, "bio_to_betas_init.2.weight");
 }
 
+// Followed by a ReLU: He et al. 2015.
+bool is_stem_convolution(const TensorSpec& spec) {
+  return contains(spec.name, ".stem.") && spec.shape.size() == 4;
+}
+
 // The spread of a tensor that is neither constant nor a layer norm. Embeddings have the official standard
 // deviation; matrices the fan-in rule of torch.nn.Linear, and biases none.
 double uniform_bound(const TensorSpec& spec) {
@@ -49,6 +54,7 @@ double uniform_bound(const TensorSpec& spec) {
   for (std::size_t i = 1; i < spec.shape.size(); ++i) fan_in *= static_cast<double>(spec.shape[i]);
   // CLIP multiplies by its last projection from the left, so its rows are the inputs.
   if (ends_with(spec.name, "visual.proj")) fan_in = static_cast<double>(spec.shape[0]);
+  if (is_stem_convolution(spec)) return std::sqrt(6.0 / fan_in);
   const double gain = is_last_of_head(spec.name) ? kHeadGain : 1.0;
   return gain / std::sqrt(fan_in);
 }

@@ -7,12 +7,14 @@
 #include <utility>
 #include <vector>
 
+#include "model/collective.h"
 #include "model/losses.h"
 #include "model/net.h"
 #include "smal/safetensors.h"
 
 namespace q3d::model {
 
+// Of several ranks each holds its part of the joint batch; the parts must be of equal size.
 struct TrainingBatch {
   torch::Tensor images;  // (B, 3, 256, 256) float32, normalised
   Targets targets;
@@ -21,6 +23,7 @@ struct TrainingBatch {
 
 enum class Precision { float32, bfloat16 };  // of the forward pass; weights and losses are float32
 
+// Of the joint batch, so equal on all ranks.
 struct StepReport {
   double loss = 0.0;                                  // weighted total
   std::vector<std::pair<std::string, double>> terms;  // not weighted, in a fixed order
@@ -39,12 +42,13 @@ class Learner {
 
   virtual PrimaNet& net() const = 0;
 
-  // Tensors of the batch may be on any device. Throws std::invalid_argument on wrong shapes or labels.
+  // Tensors of the batch may be on any device. Dropout and stochastic depth draw from LibTorch's default
+  // generator. Throws std::invalid_argument on wrong shapes or labels, std::runtime_error when another rank
+  // is gone.
   virtual StepReport step(const TrainingBatch& batch) = 0;
 
-  // All that the next step depends on but the batch: weights under their official names, and under
-  // "training." the optimisers, the step count and LibTorch's random generators. A learner that restores it
-  // goes on bit for bit.
+  // All that the next step depends on but the batch and the random generator: weights under their official
+  // names, and under "training." the optimisers and the step count. Equal on all ranks.
   virtual smal::NamedTensors state() const = 0;
   // Throws std::runtime_error naming the tensor, got and expected.
   virtual void restore(const smal::SafeTensors& file) = 0;

@@ -88,7 +88,7 @@ PartialMean contrastive_loss(const torch::Tensor& features, const torch::Tensor&
 }
 
 LossTerms loss_terms(const Prediction& prediction, const Targets& targets, const Priors& priors,
-                     LossVariant variant) {
+                     LossVariant variant, const Collective& ranks) {
   LossTerms terms;
   terms.keypoints_2d = keypoint_loss(prediction.keypoints_2d, targets.keypoints_2d);
   terms.keypoints_3d = centred_keypoint_loss(prediction.keypoints_3d, targets.keypoints_3d);
@@ -104,7 +104,13 @@ LossTerms loss_terms(const Prediction& prediction, const Targets& targets, const
   terms.pose_prior = pose_prior(priors, axis_angles(prediction.rotations, variant), targets.has_pose);
   terms.shape_prior = shape_prior(priors, prediction.betas, targets.family, targets.has_betas);
   terms.initial_shape_prior = shape_prior(priors, prediction.init_betas, targets.family, targets.has_betas);
-  terms.contrastive = contrastive_loss(prediction.shape_feature, targets.family);
+  join_means({&terms.pose_prior, &terms.shape_prior, &terms.initial_shape_prior}, ranks);
+  for (torch::Tensor* sum : {&terms.keypoints_2d, &terms.keypoints_3d, &terms.aux_keypoints_2d,
+                             &terms.aux_keypoints_3d, &terms.global_orient, &terms.pose, &terms.betas}) {
+    if (ranks.size() > 1) *sum = *sum * ranks.size();
+  }
+  // Every rank computes it of all ranks' features.
+  terms.contrastive = contrastive_loss(ranks.gather(prediction.shape_feature), ranks.gather(targets.family));
   return terms;
 }
 

@@ -6,6 +6,7 @@
 
 #include <torch/torch.h>
 
+#include "model/collective.h"
 #include "model/loss_weights.h"
 #include "model/partial_mean.h"
 #include "model/prima.h"
@@ -28,7 +29,9 @@ struct Targets {
 void check_targets(const Targets& targets);
 Targets to_device(const Targets& targets, torch::Device device);
 
-// Scalars on the prediction's device, with their graphs.
+// Scalars on the prediction's device, with their graphs. With several ranks their values and gradients are
+// made such that the mean over the ranks is the joint batch's: sums and the sums of means are scaled by the
+// number of ranks, counts are those of all ranks, and the contrastive loss is of all ranks' features.
 struct LossTerms {
   torch::Tensor keypoints_2d, keypoints_3d;          // of the body
   torch::Tensor aux_keypoints_2d, aux_keypoints_3d;  // of the decoder's last keypoint tokens
@@ -37,7 +40,7 @@ struct LossTerms {
 };
 
 LossTerms loss_terms(const Prediction& prediction, const Targets& targets, const Priors& priors,
-                     LossVariant variant);
+                     LossVariant variant, const Collective& ranks = *single_rank());
 
 // The weighted sum without the adversarial term. The pose prior, halved, counts with the weights of the
 // global orientation and of the pose; the shape priors with that of the betas, the one of the initial betas

@@ -1,4 +1,4 @@
-// A module's parameters, and the random generators, as named tensors and back, bit for bit.
+// A module's parameters as named tensors and back, bit for bit.
 #pragma once
 
 #include <torch/torch.h>
@@ -19,9 +19,5 @@ void restore_parameters(const smal::SafeTensors& file, const std::string& prefix
 // file.tensor(name) with the shape and dtype of `like`, on its device. Throws as above.
 torch::Tensor restored_like(const smal::SafeTensors& file, const std::string& name,
                             const torch::Tensor& like);
-
-// LibTorch's default generators of the CPU and of `device`: what dropout and stochastic depth draw from.
-void append_generators(smal::NamedTensors& state, const std::string& prefix, torch::Device device);
-void restore_generators(const smal::SafeTensors& file, const std::string& prefix, torch::Device device);
 
 }  // namespace q3d::model

@@ -18,6 +18,14 @@ AdamW::AdamW(std::vector<ParameterGroup> groups, const AdamWOptions& options) : 
   }
 }
 
+std::vector<torch::Tensor> AdamW::parameters() const {
+  std::vector<torch::Tensor> all;
+  for (const Group& group : groups_) {
+    for (const Slot& slot : group.slots) all.push_back(slot.parameter);
+  }
+  return all;
+}
+
 void AdamW::zero_grad() {
   for (Group& group : groups_) {
     for (Slot& slot : group.slots) slot.parameter.mutable_grad().reset();

@@ -32,6 +32,9 @@ class AdamW {
  public:
   AdamW(std::vector<ParameterGroup> groups, const AdamWOptions& options);
 
+  // Of all groups, in order.
+  std::vector<torch::Tensor> parameters() const;
+
   void zero_grad();
   void step(double learning_rate);
 

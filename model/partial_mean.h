@@ -4,6 +4,10 @@
 
 #include <torch/torch.h>
 
+#include <vector>
+
+#include "model/collective.h"
+
 namespace q3d::model {
 
 struct PartialMean {
@@ -13,5 +17,9 @@ struct PartialMean {
   // 0 when nothing was counted.
   torch::Tensor value() const { return sum / count.clamp_min(1.0); }
 };
+
+// Makes each count that of all ranks and scales the sums by their number, so that the mean over the ranks of
+// value() is the joint batch's. The counts must share dtype and device.
+void join_means(const std::vector<PartialMean*>& means, const Collective& ranks);
 
 }  // namespace q3d::model

@@ -15,7 +15,6 @@ namespace {
 constexpr const char* kOptimiser = "training.optimiser.";
 constexpr const char* kDiscriminator = "discriminator.";  // the official name
 constexpr const char* kDiscriminatorOptimiser = "training.discriminator_optimiser.";
-constexpr const char* kGenerators = "training.generator.";
 constexpr const char* kSteps = "training.steps";
 
 void require(bool holds, const std::string& message) {
@@ -66,12 +65,14 @@ void check_batch(const TrainingBatch& batch, const Priors& priors) {
 }  // namespace
 
 Trainer::Trainer(std::shared_ptr<PrimaNet> net, smal::SmalBody body, Priors priors,
-                 const TrainerOptions& options)
+                 const TrainerOptions& options, std::shared_ptr<const Collective> ranks)
     : net_(std::move(net)),
       body_(std::move(body)),
       priors_(std::move(priors)),
       options_(options),
-      optimiser_(parameter_groups(*net_, options.backbone_rate_scale), options.adamw) {
+      ranks_(std::move(ranks)),
+      optimiser_(parameter_groups(*net_, options.backbone_rate_scale), options.adamw),
+      backward_(ranks_->averaged_backward(optimiser_.parameters())) {
   const torch::Device device = net_->placement().device;
   require(net_->placement().matrix_dtype == torch::kFloat32, "the network must hold float32 weights");
   require(body_.device() == device && priors_.precs.device() == device,
@@ -86,6 +87,7 @@ Trainer::Trainer(std::shared_ptr<PrimaNet> net, smal::SmalBody body, Priors prio
   discriminator_ = std::make_shared<Discriminator>(Placement{device, torch::kFloat32});
   initialise(*discriminator_, options_.seed);
   discriminator_optimiser_.emplace(std::vector{discriminator_group(*discriminator_)}, options_.adamw);
+  discriminator_backward_ = ranks_->averaged_backward(discriminator_optimiser_->parameters());
 }
 
 Prediction Trainer::predict(const torch::Tensor& images) const {
@@ -111,21 +113,21 @@ StepReport Trainer::step(const TrainingBatch& batch) {
   optimiser_.zero_grad();
 
   const Prediction prediction = predict(batch.images.to(body_.device()));
-  const LossTerms terms = loss_terms(prediction, targets, priors_, options_.variant);
+  const LossTerms terms = loss_terms(prediction, targets, priors_, options_.variant, *ranks_);
   torch::Tensor loss = total_loss(terms, options_.weights);
   auto named = named_terms(terms);
-  if (discriminator_) {
+  if (discriminator_) {  // a mean over the batch, of parts of equal size
     const torch::Tensor adversarial =
         adversarial_loss(discriminator_->forward(body_joints(prediction.rotations), prediction.betas));
     loss = loss + options_.weights.adversarial * adversarial;
     named.emplace_back("adversarial", adversarial);
   }
-  loss.backward();
+  backward_->run(loss);
   const torch::Tensor norm = optimiser_.gradient_norm();
 
   std::vector<torch::Tensor> scalars{loss, norm};
   for (const auto& [name, term] : named) scalars.push_back(term);
-  const std::vector<double> values = to_host(scalars);
+  const std::vector<double> values = mean_over_ranks(*ranks_, to_host(scalars));
   StepReport report;
   report.loss = values[0];
   report.gradient_norm = values[1];
@@ -137,7 +139,7 @@ StepReport Trainer::step(const TrainingBatch& batch) {
   optimiser_.step(report.learning_rate);
   if (discriminator_) {
     const torch::Tensor own = step_discriminator(prediction, targets, report.learning_rate);
-    report.terms.emplace_back("discriminator", own.item<double>());
+    report.terms.emplace_back("discriminator", mean_over_ranks(*ranks_, {own.item<double>()}).front());
   }
   ++steps_;
   report.applied = true;
@@ -155,7 +157,7 @@ torch::Tensor Trainer::step_discriminator(const Prediction& prediction, const Ta
                                     ? torch::ones_like(targets.has_pose)
                                     : targets.has_pose * targets.has_betas;
   const torch::Tensor loss = discriminator_loss(predicted, real, is_real);
-  loss.backward();
+  discriminator_backward_->run(loss);
   discriminator_optimiser_->step(learning_rate);
   return loss.detach();
 }
@@ -168,7 +170,6 @@ smal::NamedTensors Trainer::state() const {
     append_parameters(state, kDiscriminator, *discriminator_);
     discriminator_optimiser_->append_state(state, kDiscriminatorOptimiser);
   }
-  append_generators(state, kGenerators, body_.device());
   state.emplace_back(kSteps, torch::tensor(steps_, torch::kInt64));
   return state;
 }
@@ -180,7 +181,6 @@ void Trainer::restore(const smal::SafeTensors& file) {
     restore_parameters(file, kDiscriminator, *discriminator_);
     discriminator_optimiser_->restore_state(file, kDiscriminatorOptimiser);
   }
-  restore_generators(file, kGenerators, body_.device());
   steps_ = restored_like(file, kSteps, torch::zeros({}, torch::kInt64)).item<std::int64_t>();
 }
 

@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 
+#include "model/collective.h"
 #include "model/discriminator.h"
 #include "model/learner.h"
 #include "model/net.h"
@@ -32,8 +33,10 @@ struct TrainerOptions {
 class Trainer : public Learner {
  public:
   // Switches the net to training mode and gives gradients to what learns. Net, body and priors must be on one
-  // device. Throws std::invalid_argument otherwise, or when the net does not hold float32.
-  Trainer(std::shared_ptr<PrimaNet> net, smal::SmalBody body, Priors priors, const TrainerOptions& options);
+  // device. Of several ranks all must start with the same weights. Throws std::invalid_argument otherwise, or
+  // when the net does not hold float32.
+  Trainer(std::shared_ptr<PrimaNet> net, smal::SmalBody body, Priors priors, const TrainerOptions& options,
+          std::shared_ptr<const Collective> ranks = single_rank());
 
   // A family that the priors lack is refused.
   StepReport step(const TrainingBatch& batch) override;
@@ -53,9 +56,12 @@ class Trainer : public Learner {
   smal::SmalBody body_;
   Priors priors_;
   TrainerOptions options_;
+  std::shared_ptr<const Collective> ranks_;
   AdamW optimiser_;
+  std::unique_ptr<AveragedBackward> backward_;
   std::shared_ptr<Discriminator> discriminator_;  // null without the adversarial loss
   std::optional<AdamW> discriminator_optimiser_;
+  std::unique_ptr<AveragedBackward> discriminator_backward_;
   std::int64_t steps_ = 0;
 };
 

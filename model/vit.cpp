@@ -79,8 +79,8 @@ Vit::Vit(const PrimaConfig& config, const Placement& placement) {
       register_parameter("pos_embed", torch::empty({1, kImageTokens + 1, width}, placement.vector()));
   cls_token_ = register_parameter("cls_token", torch::empty({1, 1, width}, placement.vector()));
   const auto patch_embed = register_module("patch_embed", std::make_shared<torch::nn::Module>());
-  patch_ = patch_embed->register_module(
-      "proj", std::make_shared<PatchConv>(width, kPatchPx, kPatchPaddingPx, /*has_bias=*/true, placement));
+  const Tokeniser::Patches patches{"proj", kPatchPx, kPatchPaddingPx, /*has_bias=*/true};
+  tokeniser_ = std::make_unique<Tokeniser>(*patch_embed, patches, width, config.stem_depth, placement);
   const auto blocks = register_module("blocks", std::make_shared<torch::nn::Module>());
   for (std::int64_t i = 0; i < config.depth; ++i) {
     const double rate =
@@ -92,7 +92,7 @@ Vit::Vit(const PrimaConfig& config, const Placement& placement) {
 }
 
 torch::Tensor Vit::forward(const torch::Tensor& images, const Observer& observe) const {
-  const torch::Tensor patches = patch_->forward(images);
+  const torch::Tensor patches = tokeniser_->forward(images);
   if (observe) observe("vit_patch_tokens", patches);
   // As in the official code, the class token's position is added to every patch and not to the class token.
   const torch::Tensor placed = patches + pos_embed_.narrow(1, 1, kImageTokens) + pos_embed_.narrow(1, 0, 1);

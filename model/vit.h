@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "model/config.h"
+#include "model/conv_stem.h"
 #include "model/layers.h"
 
 namespace q3d::model {
@@ -26,7 +27,7 @@ class Vit : public torch::nn::Module {
   torch::Tensor forward(const torch::Tensor& images, const Observer& observe = {}) const;
 
  private:
-  std::shared_ptr<PatchConv> patch_;
+  std::unique_ptr<Tokeniser> tokeniser_;
   torch::Tensor pos_embed_;  // (1, 193, embed_dim)
   torch::Tensor cls_token_;  // (1, 1, embed_dim)
   std::vector<std::shared_ptr<VitBlock>> blocks_;

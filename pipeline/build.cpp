@@ -29,11 +29,14 @@ class UnitBuilder {
         workspace_(workspace),
         predictions_(workspace.out(), "predict", keys.predict),
         refinements_(workspace.out(), "refine", keys.refine),
-        shards_(workspace.out(), "shards", keys.shards),
+        shards_(workspace.out(), "shards", keys.shards, &Unit::label_digest),
         judgements_(workspace.ingest().candidates.size()),
         progress_("candidates", static_cast<std::int64_t>(workspace.ingest().candidates.size()),
                   workspace.quiet()) {
-    if (!keys.measure.empty()) measurements_.emplace(workspace.out(), "measure", keys.measure);
+    // By the labels' digest: what a veto leaves out is not measured.
+    if (!keys.measure.empty()) {
+      measurements_.emplace(workspace.out(), "measure", keys.measure, &Unit::label_digest);
+    }
   }
 
   void run() {
@@ -88,7 +91,7 @@ class UnitBuilder {
 
   void write(UnitWork& work) {
     const Unit& unit = *work.unit;
-    if (!work.predicted_before) predictions_.save(unit, to_table(*work.predicted));
+    if (!work.predicted_before) predictions_.save(unit, to_table(work.candidates, *work.predicted));
     if (!work.refined_before) refinements_.save(unit, to_table(*work.refined));
     if (work.measured && !work.measured_before) measurements_->save(unit, to_table(*work.measured));
     if (!work.shard_before) write_unit_shard(work);

@@ -6,6 +6,7 @@
 #include <regex>
 #include <set>
 
+#include "filters/near_duplicates.h"
 #include "pipeline/config_layers.h"
 #include "pipeline/json_fields.h"
 #include "pipeline/profiles.h"
@@ -20,12 +21,34 @@ void require(bool holds, const std::string& where, const std::string& what) {
   if (!holds) throw ConfigError(where + ": " + what);
 }
 
+// What only labels of one's own need: their keypoints are not known beforehand.
+void read_label_options(JsonFields& fields, DatasetConfig& options) {
+  const bool is_own = options.format == "coco" || options.format == "deeplabcut";
+  for (const char* key : {"topology", "species", "min_confidence", "box_margin"}) {
+    require(is_own || fields.child(key) == nullptr, fields.where(),
+            fmt::format("\"{}\" belongs to the formats \"coco\" and \"deeplabcut\", got it with \"{}\"", key,
+                        options.format));
+  }
+  if (!is_own) return;
+  std::string topology;
+  fields.require("topology", topology);
+  fields.read("species", options.species);
+  fields.read("min_confidence", options.min_confidence);
+  fields.read("box_margin", options.box_margin);
+  require(options.min_confidence >= 0 && options.min_confidence <= 1, fields.where(),
+          fmt::format("\"min_confidence\" must be 0 to 1, got {}", options.min_confidence));
+  require(options.box_margin >= 0 && options.box_margin <= 2, fields.where(),
+          fmt::format("\"box_margin\" must be 0 to 2, got {}", options.box_margin));
+  options.topology = topology;
+}
+
 DatasetConfig parse_dataset(const json& object, const std::string& where) {
   DatasetConfig options;
   std::string root;
   std::string annotations;
   std::string images;
   std::string role(to_string(options.role));
+  std::string curation;
   JsonFields fields(object, where);
   fields.require("name", options.name);
   fields.require("format", options.format);
@@ -35,6 +58,8 @@ DatasetConfig parse_dataset(const json& object, const std::string& where) {
   fields.read("split", options.split);
   fields.read("images", images);
   fields.read("role", role);
+  fields.read("curation", curation);
+  read_label_options(fields, options);
   fields.finish();
   require_one_of(options.format, loaders::dataset_formats(), where + ": format");
   require(std::regex_match(options.name, std::regex("[A-Za-z0-9_.-]+")), where,
@@ -47,7 +72,42 @@ DatasetConfig parse_dataset(const json& object, const std::string& where) {
   options.root = root;
   options.annotations = annotations;
   options.images = images;
+  options.curation = curation;
   return options;
+}
+
+}  // namespace
+
+std::vector<DatasetConfig> parse_datasets(const json& list, const std::string& where) {
+  require(list.is_array(), where, "must be a list of objects");
+  std::vector<DatasetConfig> datasets;
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    datasets.push_back(parse_dataset(list[i], fmt::format("{}[{}]", where, i)));
+  }
+  return datasets;
+}
+
+void resolve_dataset_paths(json& object, const char* key, const fs::path& folder) {
+  if (!object.is_object() || !object.contains(key) || !object[key].is_array()) return;
+  for (json& dataset : object[key]) {
+    for (const char* path : {"root", "topology", "curation"}) resolve_path(dataset, path, folder);
+  }
+}
+
+namespace {
+
+LeakageConfig parse_leakage(const json& object, const std::string& where) {
+  LeakageConfig leakage;
+  JsonFields fields(object, where);
+  if (const json* sets = fields.child("test_sets")) {
+    leakage.test_sets = parse_datasets(*sets, where + ": test_sets");
+  }
+  fields.read("max_distance", leakage.max_distance);
+  fields.finish();
+  require(!leakage.test_sets.empty(), where, "\"test_sets\" must name at least one dataset");
+  require(leakage.max_distance >= 0 && leakage.max_distance <= filters::kMaxHashDistance, where,
+          fmt::format("\"max_distance\" must be 0 to {}", filters::kMaxHashDistance));
+  return leakage;
 }
 
 void parse_network(const json& object, const std::string& where, NetworkConfig& network) {
@@ -182,9 +242,9 @@ void resolve_paths(json& config, const fs::path& folder) {
     resolve_path(config["network"], "smal_asset", folder);
   }
   if (config.contains("guards")) resolve_path(config["guards"], "priors", folder);
-  if (config.contains("datasets") && config["datasets"].is_array()) {
-    for (auto& dataset : config["datasets"]) resolve_path(dataset, "root", folder);
-  }
+  resolve_path(config, "veto", folder);
+  resolve_dataset_paths(config, "datasets", folder);
+  if (config.contains("leakage")) resolve_dataset_paths(config["leakage"], "test_sets", folder);
 }
 
 // The config laid over its profile.
@@ -212,11 +272,11 @@ BuildConfig parse_build_config(const json& merged, const std::string& where) {
   fields.read("profile", config.profile);
   fields.read("name", config.name);
   fields.read("version", config.version);
+  std::string veto;
+  fields.read("veto", veto);
+  config.veto = veto;
   if (const json* datasets = fields.child("datasets")) {
-    require(datasets->is_array(), where, "\"datasets\" must be a list of objects");
-    for (std::size_t i = 0; i < datasets->size(); ++i) {
-      config.datasets.push_back(parse_dataset((*datasets)[i], fmt::format("{}: datasets[{}]", where, i)));
-    }
+    config.datasets = parse_datasets(*datasets, where + ": datasets");
   }
   require(!config.datasets.empty(), where, "\"datasets\" must name at least one dataset");
   if (const json* network = fields.child("network")) {
@@ -227,6 +287,9 @@ BuildConfig parse_build_config(const json& merged, const std::string& where) {
             "it. Datasets that bring theirs have the role \"truth\" or \"2d_only\"");
   }
   if (const json* tta = fields.child("tta")) parse_tta(*tta, where + ": tta", config.tta);
+  if (const json* leakage = fields.child("leakage")) {
+    config.leakage = parse_leakage(*leakage, where + ": leakage");
+  }
   if (const json* filter = fields.child("filter")) {
     parse_filter(*filter, where + ": filter", names_of(config.datasets), config.filter);
   }

@@ -21,6 +21,7 @@ namespace q3d::pipeline {
 // How a dataset is read, and what the build makes of it.
 struct DatasetConfig : loaders::DatasetOptions {
   Role role = Role::pseudo;
+  std::filesystem::path curation{};  // list of `curate` that names the pictures to take; empty takes all
 };
 
 struct NetworkConfig {
@@ -78,6 +79,12 @@ struct ShardConfig {
   int crop_min_side_px = 480;
 };
 
+// Pictures of the pool that are in these sets too are left out of the pseudo labels.
+struct LeakageConfig {
+  std::vector<DatasetConfig> test_sets;
+  int max_distance = 4;  // bits of 64 in which the hashes of one picture's copies may differ
+};
+
 struct BuildConfig {
   std::string name = "quadruped3d";
   std::string version = "1.0.0";  // semantic version of the dataset, the user's own
@@ -89,12 +96,20 @@ struct BuildConfig {
   GuardConfig guards;
   ShardConfig shards;
   CalibrateConfig calibrate;
-  nlohmann::json as_written;  // the merged JSON, paths as the user wrote them
+  std::optional<LeakageConfig> leakage;
+  std::filesystem::path veto;  // ids to leave out (pipeline/veto.h); empty when there are none
+  nlohmann::json as_written;   // the merged JSON, paths as the user wrote them
 };
 
 // Reads the files in order; a later file's keys replace an earlier one's. Relative paths are relative to the
 // file that names them. Throws ConfigError naming file, key, got and expected.
 BuildConfig load_build_config(const std::vector<std::filesystem::path>& files);
+
+// A list of datasets, as "datasets" holds them; paths are absolute already. Throws ConfigError.
+std::vector<DatasetConfig> parse_datasets(const nlohmann::json& list, const std::string& where);
+
+// Makes the paths of the datasets in object[key] absolute, where it is a list of them.
+void resolve_dataset_paths(nlohmann::json& object, const char* key, const std::filesystem::path& folder);
 
 // Checks and converts merged JSON; `where` names it in messages.
 BuildConfig parse_build_config(const nlohmann::json& json, const std::string& where);

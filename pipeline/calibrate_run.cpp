@@ -36,8 +36,8 @@ struct Scored {
   filters::ScoredSample score;
 };
 
-// Of every candidate with pseudo labels and a prediction, in ingest order. What an earlier run predicted is
-// not predicted again.
+// Of every candidate with pseudo labels and a prediction that is not excluded, in ingest order. What an
+// earlier run predicted is not predicted again.
 std::vector<Scored> predict_pool(const BuildConfig& config, Workspace& workspace) {
   const Ingest& ingest = workspace.ingest();
   StageStore predictions(workspace.out(), "predict",
@@ -59,8 +59,9 @@ std::vector<Scored> predict_pool(const BuildConfig& config, Workspace& workspace
     if (!work.predicted) predict_unit(work, [&]() -> Network& { return workspace.network(); });
   };
   flow.write = [&](UnitWork& work) {
-    if (!work.predicted_before) predictions.save(*work.unit, to_table(*work.predicted));
+    if (!work.predicted_before) predictions.save(*work.unit, to_table(work.candidates, *work.predicted));
     for (std::size_t i = 0; i < work.candidates.size(); ++i) {
+      if (work.candidates[i].exclusion.reason != manifests::Reason::none) continue;
       const PredictedSample& predicted = (*work.predicted)[i];
       const double error = initial_error(work.candidates[i], predicted);
       if (std::isnan(error)) continue;

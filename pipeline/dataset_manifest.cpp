@@ -8,12 +8,14 @@
 #include <stdexcept>
 
 #include "manifests/atomic_file.h"
+#include "manifests/csv.h"
 #include "manifests/shard.h"
 #include "pipeline/effective_config.h"
 
 namespace q3d::pipeline {
 namespace {
 
+using manifests::csv_cell;
 using manifests::Verdict;
 using nlohmann::json;
 using nlohmann::ordered_json;
@@ -128,6 +130,21 @@ ordered_json describe_guards(const DatasetInputs& inputs) {
   return guards;
 }
 
+ordered_json describe_veto(const std::optional<Veto>& veto) {
+  if (!veto) return nullptr;
+  return {{"sha256", veto->sha256}, {"ids", veto->reasons.size()}, {"matched", veto->matched}};
+}
+
+ordered_json describe_leakage(const DatasetInputs& inputs) {
+  const std::optional<LeakageSummary>& leakage = inputs.ingest->leakage;
+  if (!leakage) return nullptr;
+  return {{"test_sets", leakage->test_sets},
+          {"test_pictures", leakage->test_pictures},
+          {"max_distance", inputs.config->leakage->max_distance},
+          {"excluded", leakage->excluded},
+          {"pictures_alike_in_pool", leakage->in_groups}};
+}
+
 ordered_json text_or_null(const std::string& text) {
   return text.empty() ? ordered_json(nullptr) : ordered_json(text);
 }
@@ -135,13 +152,6 @@ ordered_json text_or_null(const std::string& text) {
 // Shortest text that reads back as the same number; empty for NaN.
 std::string number(double value) {
   return std::isnan(value) ? std::string() : fmt::format("{}", value);
-}
-
-std::string csv_field(const std::string& text) {
-  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
-  std::string quoted = "\"";
-  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return quoted + '"';
 }
 
 }  // namespace
@@ -199,6 +209,8 @@ std::string dataset_json(const DatasetInputs& inputs, const std::vector<manifest
                                  {"provenance",
                                   {{"config", inputs.config->as_written},
                                    {"annotations", inputs.ingest->annotation_digests},
+                                   {"veto", describe_veto(inputs.ingest->veto)},
+                                   {"leakage", describe_leakage(inputs)},
                                    {"checkpoint_sha256", text_or_null(inputs.assets->checkpoint)},
                                    {"smal_asset_sha256", text_or_null(inputs.assets->smal_asset)},
                                    {"priors_sha256", text_or_null(inputs.assets->priors)},
@@ -227,15 +239,15 @@ std::string verdicts_csv(const Ingest& ingest, const std::vector<manifests::Judg
       const manifests::Judgement& judgement = judgements[i];
       const bool kept = is_kept(judgement);
       const bool judged = !std::isnan(judgement.initial_error);
-      text += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", csv_field(record.id),
+      text += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", csv_cell(record.id),
                           manifests::to_string(judgement.verdict), manifests::to_string(judgement.reason),
                           number(judgement.initial_error), number(judgement.final_error),
                           number(judgement.gain), judged ? std::to_string(judgement.iterations) : "",
-                          judged ? std::to_string(judgement.best_iteration) : "", csv_field(record.dataset),
-                          csv_field(record.split), csv_field(record.source), csv_field(record.species),
+                          judged ? std::to_string(judgement.best_iteration) : "", csv_cell(record.dataset),
+                          csv_cell(record.split), csv_cell(record.source), csv_cell(record.species),
                           manifests::to_string(record.family), kept ? std::to_string(unit.index) : "",
                           kept ? std::to_string(row) : "", ingest.candidates[i].image_sha256,
-                          csv_field(judgement.detail));
+                          csv_cell(judgement.detail));
       if (kept) ++row;
     }
   }

@@ -8,7 +8,7 @@
 #include <stdexcept>
 
 #include "manifests/record_json.h"
-#include "pipeline/errors.h"
+#include "pipeline/configured_dataset.h"
 #include "pipeline/interrupt.h"
 
 namespace q3d::pipeline {
@@ -16,8 +16,12 @@ namespace {
 
 using manifests::Reason;
 
-std::filesystem::path annotation_path(const loaders::DatasetOptions& options) {
-  return options.annotations.is_absolute() ? options.annotations : options.root / options.annotations;
+// One file's own digest, or one over the digests of several.
+std::string digest_files(const std::vector<std::filesystem::path>& files, manifests::DigestCache& digests) {
+  if (files.size() == 1) return digests.digest(files.front());
+  std::string text;
+  for (const auto& file : files) text += digests.digest(file) + '\n';
+  return manifests::sha256(text);
 }
 
 void require_unique_ids(const std::vector<Candidate>& candidates) {
@@ -27,14 +31,6 @@ void require_unique_ids(const std::vector<Candidate>& candidates) {
       throw std::runtime_error(fmt::format("the sample id {} occurs twice; ids must be unique within a build",
                                            candidate.record.id));
     }
-  }
-}
-
-loaders::Dataset load(const loaders::DatasetOptions& options) {
-  try {
-    return loaders::load_dataset(options);
-  } catch (const std::invalid_argument& error) {
-    throw ConfigError(fmt::format("dataset {}: {}", options.name, error.what()));
   }
 }
 
@@ -84,6 +80,7 @@ std::vector<Unit> cut_units(const std::vector<Candidate>& candidates, std::size_
       text += std::string(to_string(candidates[i].role)) + '\n';
     }
     unit.input_digest = manifests::sha256(text);
+    unit.label_digest = unit.input_digest;
     units.push_back(std::move(unit));
   }
   return units;
@@ -91,15 +88,23 @@ std::vector<Unit> cut_units(const std::vector<Candidate>& candidates, std::size_
 
 }  // namespace
 
+IngestedDataset read_dataset(const DatasetConfig& options, manifests::DigestCache& digests) {
+  throw_if_interrupted();
+  loaders::Dataset dataset = load_configured(options);
+  for (auto& record : dataset.records) {
+    record.failure_detail = without_root(std::move(record.failure_detail), options.root);
+  }
+  std::string digest = digest_files(dataset.files, digests);
+  return {std::move(dataset), std::move(digest)};
+}
+
 Ingest ingest(const BuildConfig& config, manifests::DigestCache& digests) {
   Ingest result;
   for (const auto& options : config.datasets) {
-    throw_if_interrupted();
-    loaders::Dataset dataset = load(options);
+    auto [dataset, digest] = read_dataset(options, digests);
     const std::string name = options.name + "/" + options.split;
-    result.annotation_digests[name] = digests.digest(annotation_path(options));
+    result.annotation_digests[name] = std::move(digest);
     for (auto& record : dataset.records) {
-      record.failure_detail = without_root(std::move(record.failure_detail), options.root);
       check_role(options.role, record);
       result.candidates.push_back({std::move(record), {}, options.role});
     }

@@ -14,22 +14,23 @@ std::filesystem::path opened(const std::filesystem::path& out, const std::string
   return folder;
 }
 
-std::string file_name(const Unit& unit) {
-  return fmt::format("unit-{:06}.h5", unit.index);
-}
-
 }  // namespace
 
-StageStore::StageStore(const std::filesystem::path& out, const std::string& stage, const std::string& key)
-    : folder_(opened(out, stage, key)), journal_(folder_ / "journal.jsonl") {}
+std::filesystem::path unit_file(const std::filesystem::path& folder, std::int64_t unit) {
+  return folder / fmt::format("unit-{:06}.h5", unit);
+}
+
+StageStore::StageStore(const std::filesystem::path& out, const std::string& stage, const std::string& key,
+                       std::string Unit::*digest)
+    : folder_(opened(out, stage, key)), digest_(digest), journal_(folder_ / "journal.jsonl") {}
 
 std::filesystem::path StageStore::file(const Unit& unit) const {
-  return folder_ / file_name(unit);
+  return unit_file(folder_, unit.index);
 }
 
 std::optional<manifests::JournalEntry> StageStore::entry(const Unit& unit) const {
   const std::lock_guard lock(mutex_);
-  return journal_.find(unit.index, unit.input_digest);
+  return journal_.find(unit.index, unit.*digest_);
 }
 
 bool StageStore::has(const Unit& unit) const {
@@ -50,8 +51,8 @@ void StageStore::save(const Unit& unit, std::int64_t rows,
                       const std::function<std::string(const std::filesystem::path&)>& write) {
   manifests::JournalEntry entry;
   entry.unit = unit.index;
-  entry.input_digest = unit.input_digest;
-  entry.file = file_name(unit);
+  entry.input_digest = unit.*digest_;
+  entry.file = file(unit).filename().string();
   entry.sha256 = write(file(unit));
   entry.bytes = static_cast<std::int64_t>(std::filesystem::file_size(file(unit)));
   entry.rows = rows;

@@ -13,11 +13,15 @@
 
 namespace q3d::pipeline {
 
+// A unit's file in a stage's folder.
+std::filesystem::path unit_file(const std::filesystem::path& folder, std::int64_t unit);
+
 // Thread-safe: one thread may save units while another asks for them.
 class StageStore {
  public:
-  // Opens or makes <out>/stages/<stage>-<key>/.
-  StageStore(const std::filesystem::path& out, const std::string& stage, const std::string& key);
+  // Opens or makes <out>/stages/<stage>-<key>/. `digest` is what of a unit its file depends on.
+  StageStore(const std::filesystem::path& out, const std::string& stage, const std::string& key,
+             std::string Unit::*digest = &Unit::input_digest);
 
   bool has(const Unit& unit) const;
   std::optional<manifests::Table> load(
@@ -32,6 +36,7 @@ class StageStore {
 
  private:
   std::filesystem::path folder_;
+  std::string Unit::*digest_;
   mutable std::mutex mutex_;  // guards journal_
   manifests::Journal journal_;
 };

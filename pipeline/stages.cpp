@@ -18,7 +18,7 @@ using nlohmann::json;
 
 // Raise a number when a change of the code changes what the stage writes.
 constexpr int kIngestCode = 2;
-constexpr int kPredictCode = 1;
+constexpr int kPredictCode = 2;
 constexpr int kFidelityCode = 1;
 constexpr int kRefineCode = 1;
 constexpr int kMeasureCode = 1;
@@ -38,7 +38,7 @@ std::string ingest_key(const BuildConfig& config, const Ingest& ingest) {
         {{"name", name}, {"format", dataset.format}, {"annotations", ingest.annotation_digests.at(name)}});
   }
   json units = json::array();
-  for (const Unit& unit : ingest.units) units.push_back(unit.input_digest);
+  for (const Unit& unit : ingest.units) units.push_back(unit.label_digest);
   return key_of("ingest", kIngestCode, {{"datasets", datasets}, {"units", units}});
 }
 

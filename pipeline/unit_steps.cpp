@@ -33,7 +33,8 @@ std::optional<Wanted> wanted(const UnitWork& work, std::size_t i, const JudgingR
   const Candidate& candidate = work.candidates[i];
   if (candidate.record.failure != Reason::none) return std::nullopt;
   const bool is_pseudo = candidate.role == Role::pseudo;
-  const bool makes_shard = rules != nullptr && !work.shard_before;
+  const bool is_left_out = candidate.exclusion.reason != Reason::none;
+  const bool makes_shard = rules != nullptr && !work.shard_before && !is_left_out;
   const bool measures_mask = is_pseudo && rules != nullptr && rules->guards.mask_iou_min > 0.0 &&
                              !work.measured && !candidate.record.mask_path.empty();
   if (!work.predicted) {
@@ -98,6 +99,14 @@ manifests::Judgement judge_predicted(const Candidate& candidate, const Predicted
   if (predicted.failure != Reason::none) return failed(predicted.failure, predicted.detail);
   if (candidate.role != Role::pseudo) return judge_annotated(candidate, predicted.body);
   return filters::judge_initial(initial_error(candidate, predicted), rules.of(candidate.record.dataset));
+}
+
+// What is excluded keeps its numbers; what failed stays failed.
+void apply_exclusion(const Exclusion& exclusion, manifests::Judgement& judgement) {
+  if (exclusion.reason == Reason::none || judgement.verdict == Verdict::failed) return;
+  judgement.verdict = Verdict::discarded;
+  judgement.reason = exclusion.reason;
+  judgement.detail = exclusion.detail;
 }
 
 // The body of a candidate whose role is not `pseudo`, and what its label will lack.
@@ -257,6 +266,7 @@ void judge_unit(UnitWork& work, const JudgingRules& rules) {
     }
   }
   for (std::size_t i = 0; i < work.candidates.size(); ++i) {
+    apply_exclusion(work.candidates[i].exclusion, work.judgements[i]);
     std::string& detail = work.judgements[i].detail;
     if (detail.empty()) detail = (*work.predicted)[i].detail;
   }

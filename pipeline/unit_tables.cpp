@@ -102,18 +102,47 @@ const std::vector<std::string>& text_column(const Table& table, const std::strin
   return found->second;
 }
 
+// Texts of the table are padded with NUL, so none may hold one; a hostile annotation file's may.
+std::string storable(std::string text) {
+  std::replace(text.begin(), text.end(), '\0', '?');
+  return text;
+}
+
+void add_candidates(Table& table, std::span<const Candidate> candidates) {
+  std::vector<double> boxes;
+  std::vector<double> positions;
+  std::vector<float> v;
+  std::vector<float> weights;
+  for (const Candidate& candidate : candidates) {
+    const manifests::SampleRecord& record = candidate.record;
+    table.text["id"].push_back(storable(record.id));
+    table.text["image_ref"].push_back(storable(record.image_ref));
+    boxes.insert(boxes.end(), {record.box.x_px, record.box.y_px, record.box.w_px, record.box.h_px});
+    for (const manifests::Keypoint& point : record.keypoints) {
+      positions.insert(positions.end(), {point.x_px, point.y_px});
+      v.push_back(point.v);
+      weights.push_back(point.weight);
+    }
+  }
+  table.add<double>("box_xywh_px", {4}, boxes);
+  table.add<double>("keypoints_px", {manifests::kNumKeypoints, 2}, positions);
+  table.add<float>("keypoint_v", {manifests::kNumKeypoints}, v);
+  table.add<float>("keypoint_weight", {manifests::kNumKeypoints}, weights);
+}
+
 }  // namespace
 
-Table to_table(const std::vector<PredictedSample>& samples) {
+Table to_table(std::span<const Candidate> candidates, const std::vector<PredictedSample>& samples) {
   Table table;
   table.rows = static_cast<std::int64_t>(samples.size());
+  add_candidates(table, candidates);
   std::vector<std::int32_t> image_size;
   std::vector<std::uint8_t> has_mask;
   for (const PredictedSample& sample : samples) {
     image_size.insert(image_size.end(), {sample.image_width_px, sample.image_height_px});
     has_mask.push_back(sample.has_mask ? 1 : 0);
     table.text["failure"].emplace_back(manifests::to_string(sample.failure));
-    table.text["detail"].push_back(sample.detail);
+    table.text["detail"].push_back(storable(sample.detail));
   }
   table.add<std::int32_t>("image_size_px", {2}, image_size);
   table.add<std::uint8_t>("has_mask", {}, has_mask);
@@ -137,6 +166,22 @@ std::vector<PredictedSample> predicted_from_table(const Table& table) {
   }
   read_bodies(table, samples);
   return samples;
+}
+
+manifests::SampleRecord candidate_from_table(const Table& table, std::size_t row) {
+  manifests::SampleRecord record;
+  record.id = text_column(table, "id").at(row);
+  record.image_ref = text_column(table, "image_ref").at(row);
+  const auto box = table.column<double>("box_xywh_px").subspan(4 * row, 4);
+  record.box = {box[0], box[1], box[2], box[3]};
+  const auto positions = table.column<double>("keypoints_px");
+  const auto v = table.column<float>("keypoint_v");
+  const auto weights = table.column<float>("keypoint_weight");
+  for (std::size_t k = 0; k < record.keypoints.size(); ++k) {
+    const std::size_t at = row * record.keypoints.size() + k;
+    record.keypoints[k] = {positions[2 * at], positions[2 * at + 1], v[at], weights[at]};
+  }
+  return record;
 }
 
 Table to_table(const std::vector<RefinedSample>& samples) {

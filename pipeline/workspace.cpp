@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <thread>
 
+#include "pipeline/exclusions.h"
+
 namespace q3d::pipeline {
 namespace {
 
@@ -34,6 +36,7 @@ Workspace::Workspace(const BuildConfig& config, const RunOptions& options)
       assets_(digest_assets(config, digests_)),
       device_key_(needs_network(config) ? pipeline::device_key(config.network) : std::string()),
       ingest_(pipeline::ingest(config, digests_)) {
+  leave_out(config, digests_, options.out, options.quiet, ingest_);
   if (options_.quiet) return;
   fmt::print(stderr, "{} candidates in {} units\n", ingest_.candidates.size(), ingest_.units.size());
   for (const std::string& note : ingest_.notes) fmt::print(stderr, "note: {}\n", note);

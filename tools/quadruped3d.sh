@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # The main job behind `make quadruped3d`: OUT, and optionally a config. Without a config it makes the rendered sample
-# world and the default network first, so that a newcomer sees a dataset within minutes and without any licence. Its
-# pictures are others than those of data/world, which the sample loop trains on.
+# world first and labels it with the network that ships (models/), so that a newcomer sees a dataset within minutes and
+# without any licence. Its pictures are others than those of data/world, which that network was trained on.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -13,7 +13,6 @@ mkdir -p "$out"
 if [ -z "$config" ]; then
   config=configs/sample.json
   [ -f data/sample_world/world.json ] || "$program" sample --out data/sample_world --share 0.08 --seed 1
-  [ -f data/small.safetensors ] || "$program" init --size small --out data/small.safetensors
 fi
 
 layers=(--config "$config")

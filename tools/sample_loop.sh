@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # The paper's three stages on the rendered world, from nothing:
-#   tools/sample_loop.sh model             pools, pre-trained encoders, Stage 1 (full schedule): the default network
+#   tools/sample_loop.sh model             pools, pre-trained encoders, Stage 1 (full schedule): models/small.safetensors
 #   tools/sample_loop.sh loop SCHEDULE SEED   Stage 1, Stage 2, Stage 3, and both networks on the test sets
 # SCHEDULE is full or quick. Every step does what is missing, so a run that was stopped goes on where it was.
 set -euo pipefail
@@ -32,6 +32,7 @@ layers() {
   cat >"$run/run.json" <<JSON
 { "network": { "encoders": "../pretrain/model.safetensors" },
   "pools": { "quadruped3d": { "shards": ["stage2/latest"], "weight": 0.15 } },
+  "model_dtype": "float16",
   "seed": $seed }
 JSON
   printf -- '--config configs/world_training.json '
@@ -57,11 +58,14 @@ loop() {
   local run=$home/$schedule-$seed
   stage1 "$schedule" "$seed" "$run"
   say "Stage 2: pseudo labels for the 2D-only pictures"
-  printf '{ "network": { "checkpoint": "stage1/model.safetensors" } }\n' >"$run/stage2.json"
+  printf '{ "network": { "checkpoint": "stage1/model.safetensors", "compute_threads": 1 } }\n' >"$run/stage2.json"
   local stage2=(--config configs/world_stage2.json --config "$run/stage2.json")
   [ -f "$run/thresholds.json" ] ||
     "$program" calibrate "${stage2[@]}" --out "$run/stage2" --write "$run/thresholds.json"
   "$program" build "${stage2[@]}" --config "$run/thresholds.json" --out "$run/stage2"
+  say "how true the pseudo labels are"
+  "$program" evaluate-labels "${stage2[@]}" --config "$run/thresholds.json" --out "$run/stage2" \
+    --truth data/world/truth/superanimal_quadruped_train.json --masks data/world --report "$run/labels"
   say "Stage 3: a fresh head on the same encoders, with the pseudo labels in place of the 2D annotations"
   # shellcheck disable=SC2046
   "$program" train $(layers "$schedule" "$seed" "$run") --stage 3 --out "$run/stage3"
@@ -76,6 +80,7 @@ case "${1:-}" in
   model)
     prepare
     stage1 full 0 "$home/full-0"
+    say "trained: $home/full-0/stage1/model.safetensors (models/small.safetensors ships such a network)"
     ;;
   loop)
     prepare

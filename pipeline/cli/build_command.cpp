@@ -15,6 +15,7 @@ namespace {
 
 struct Arguments {
   std::vector<std::filesystem::path> configs;
+  std::filesystem::path veto;
   RunOptions run;
   bool json = false;
 };
@@ -63,6 +64,15 @@ nlohmann::ordered_json to_json(const BuildSummary& summary) {
           {"seconds", summary.seconds}};
 }
 
+// The veto of the command line stands over the config's.
+BuildConfig configured(const Arguments& arguments) {
+  BuildConfig config = load_build_config(arguments.configs);
+  if (arguments.veto.empty()) return config;
+  config.veto = std::filesystem::absolute(arguments.veto);
+  config.as_written["veto"] = arguments.veto.string();
+  return config;
+}
+
 }  // namespace
 
 Command add_build(CLI::App& app) {
@@ -74,6 +84,9 @@ Command add_build(CLI::App& app) {
       ->check(CLI::ExistingFile);
   command->add_option("-o,--out", arguments->run.out, "output folder; OUT/latest is the newest dataset")
       ->required();
+  command
+      ->add_option("--veto", arguments->veto, "file of sample ids to leave out, one a line; after a tab, why")
+      ->check(CLI::ExistingFile);
   command->add_option("-t,--threads", arguments->run.threads, "threads that read and decode (0 = all cores)")
       ->check(CLI::NonNegativeNumber);
   command->add_flag("--json", arguments->json, "print a machine-readable summary on stdout");
@@ -82,6 +95,7 @@ Command add_build(CLI::App& app) {
       "Examples:\n"
       "  quadruped3d build --config configs/sample.json --config out/thresholds.json --out out\n"
       "  quadruped3d build -c my.json -o out --json > summary.json\n"
+      "  quadruped3d build -c my.json -o out --veto veto.txt\n"
       "  quadruped3d build -c configs/world_pools/animal3d.json -o out/pools/animal3d\n"
       "A build that was killed goes on where it left off when the same command is run again, and ends with "
       "the same\n"
@@ -90,7 +104,7 @@ Command add_build(CLI::App& app) {
       "\"truth\" or\n"
       "\"2d_only\" bring their labels: they need neither thresholds nor a network (docs/config.md).");
   return [arguments] {
-    const BuildSummary summary = build(load_build_config(arguments->configs), arguments->run);
+    const BuildSummary summary = build(configured(*arguments), arguments->run);
     print_summary(summary);
     if (arguments->json) fmt::print("{}\n", to_json(summary).dump());
     return 0;

@@ -17,6 +17,8 @@ Command add_build(CLI::App& app);
 Command add_calibrate(CLI::App& app);
 Command add_verify(CLI::App& app);
 Command add_inspect(CLI::App& app);
+Command add_explain(CLI::App& app);
+Command add_leakage(CLI::App& app);
 Command add_init(CLI::App& app);
 Command add_sample(CLI::App& app);
 Command add_train(CLI::App& app);
@@ -25,5 +27,6 @@ Command add_evaluate_labels(CLI::App& app);
 Command add_compare(CLI::App& app);
 Command add_compare_labels(CLI::App& app);
 Command add_config(CLI::App& app);
+Command add_curate(CLI::App& app);
 
 }  // namespace q3d::pipeline::cli

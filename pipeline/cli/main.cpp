@@ -49,6 +49,9 @@ int run(int argc, char** argv) {
       {"evaluate-labels", cli::add_evaluate_labels(app)},
       {"compare-labels", cli::add_compare_labels(app)},
       {"config", cli::add_config(app)},
+      {"explain", cli::add_explain(app)},
+      {"leakage", cli::add_leakage(app)},
+      {"curate", cli::add_curate(app)},
   };
   try {
     app.parse(argc, argv);

@@ -60,12 +60,14 @@ Command add_train(CLI::App& app) {
       "Examples:\n"
       "  quadruped3d train --config configs/world_training.json --stage 1 --out out/stage1\n"
       "  quadruped3d train -c my.json --stage 3 -o out/stage3 --max-steps 1000\n"
+      "  torchrun --no-python --nproc-per-node 4 quadruped3d train -c my.json --stage 1 -o out/stage1\n"
       "A run that was stopped goes on from its newest state when the same command is run again, with the "
       "weights that\n"
       "it would have had anyway. docs/training.md describes the config, the log and the state.");
   return [arguments] {
     const TrainingSummary summary =
         train(load_training_config(arguments->configs, arguments->stage), arguments->options);
+    if (summary.rank != 0) return 0;  // rank 0 speaks for all
     print_summary(summary);
     if (arguments->json) fmt::print("{}\n", to_json(summary).dump());
     return 0;

@@ -8,9 +8,8 @@
 #include <stdexcept>
 #include <thread>
 
-#include "loaders/dataset.h"
 #include "manifests/digest.h"
-#include "pipeline/errors.h"
+#include "pipeline/configured_dataset.h"
 #include "pipeline/evaluation/dataset_evaluator.h"
 #include "pipeline/evaluation/hidden_truth.h"
 #include "pipeline/interrupt.h"
@@ -36,14 +35,9 @@ std::vector<SampleRecord> evenly_spaced(std::vector<SampleRecord> records, std::
 
 LoadedDataset load(const EvaluatedDataset& dataset, std::int64_t limit) {
   throw_if_interrupted();
-  const loaders::DatasetOptions& source = dataset.source;
+  const DatasetConfig& source = dataset.source;
   LoadedDataset loaded;
-  loaders::Dataset read;
-  try {
-    read = loaders::load_dataset(source);
-  } catch (const std::invalid_argument& error) {
-    throw ConfigError(fmt::format("dataset {}: {}", source.name, error.what()));
-  }
+  loaders::Dataset read = load_configured(source);
   loaded.result.name = source.name + "/" + source.split;
   loaded.result.annotations_sha256 = manifests::sha256_file(source.root / source.annotations);
   loaded.result.notes = std::move(read.notes);

@@ -17,9 +17,10 @@ void resolve_paths(json& config, const fs::path& folder) {
     resolve_path(config["network"], "checkpoint", folder);
     resolve_path(config["network"], "smal_asset", folder);
   }
+  resolve_dataset_paths(config, "datasets", folder);
   if (!config.contains("datasets") || !config["datasets"].is_array()) return;
   for (json& dataset : config["datasets"]) {
-    for (const char* key : {"root", "truth", "masks"}) resolve_path(dataset, key, folder);
+    for (const char* key : {"truth", "masks"}) resolve_path(dataset, key, folder);
   }
 }
 

@@ -7,13 +7,12 @@
 #include <filesystem>
 #include <vector>
 
-#include "loaders/dataset.h"
 #include "pipeline/build_config.h"
 
 namespace q3d::pipeline::evaluation {
 
 struct EvaluatedDataset {
-  loaders::DatasetOptions source;
+  DatasetConfig source;
   std::filesystem::path truth;  // hidden truth of a 2D-only set; empty when there is none
   std::filesystem::path masks;  // folder that the truth's mask paths start from; empty: masks are not used
 };

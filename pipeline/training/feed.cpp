@@ -127,17 +127,26 @@ Feed::Feed(std::vector<ShardPool> pools, const std::vector<double>& weights, con
       options_(options),
       arena_(std::make_unique<tbb::task_arena>(arena_threads(options.threads))) {
   if (options.batch < 1) throw std::invalid_argument("a batch must hold at least one sample");
+  if (options.ranks < 1 || options.rank < 0 || options.rank >= options.ranks) {
+    throw std::invalid_argument(fmt::format("rank {} of {} ranks", options.rank, options.ranks));
+  }
+  if (options.batch % options.ranks != 0) {
+    throw std::invalid_argument(fmt::format(
+        "a batch of {} samples cannot be shared equally by {} ranks; choose \"batch\" as a multiple of their "
+        "number",
+        options.batch, options.ranks));
+  }
 }
 
 FeedBatch Feed::batch(std::int64_t first_draw) const {
-  FeedBatch batch = empty_batch(options_.batch, first_draw);
+  FeedBatch batch = empty_batch(options_.batch / options_.ranks, first_draw);
   arena_->execute(
       [&] { tbb::parallel_for(std::int64_t{0}, batch.size, [&](std::int64_t slot) { fill(batch, slot); }); });
   return batch;
 }
 
 void Feed::fill(FeedBatch& batch, std::int64_t slot) const {
-  const Draw draw = draws_.at(batch.first_draw + slot);
+  const Draw draw = draws_.at(batch.first_draw + options_.rank * batch.size + slot);
   const ShardPool& pool = pools_[draw.pool];
   const TrainingSample sample = pool.sample(draw.sample);
   loaders::Augmentation augmentation;

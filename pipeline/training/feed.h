@@ -21,17 +21,20 @@ namespace q3d::pipeline {
 enum class KeypointWeight { label, raw_v };
 
 struct FeedOptions {
-  int batch = 48;
+  int batch = 48;  // of all ranks together
   bool augment = true;
   loaders::AugmentOptions augmentation{};
   KeypointWeight keypoint_weight = KeypointWeight::label;
   int threads = 0;  // that decode and warp; 0 = all cores. Changes no bit
+  // Of several ranks each takes its contiguous part of every batch, so that together they see what one would.
+  int rank = 0;
+  int ranks = 1;
 };
 
-// A batch in the network's units. Arrays are row-major, the batch first; B = size.
+// A rank's part of a batch in the network's units. Arrays are row-major, the batch first; B = size.
 struct FeedBatch {
   std::int64_t size = 0;
-  std::int64_t first_draw = 0;
+  std::int64_t first_draw = 0;             // of the joint batch
   std::unique_ptr<float[]> images;         // (B, 3, 256, 256) normalised
   std::vector<float> keypoints_2d;         // (B, 26, 3): x, y in crop units and a weight
   std::vector<float> keypoints_3d;         // (B, 26, 4): SMAL units, and 1 or 0
@@ -45,18 +48,18 @@ struct FeedBatch {
 // Thread-safe. A batch depends on pools, options but the threads, seed and position alone.
 class Feed {
  public:
-  // `weights`: one a pool. Throws std::invalid_argument.
+  // `weights`: one a pool. Throws std::invalid_argument, also when the ranks cannot have equal parts.
   Feed(std::vector<ShardPool> pools, const std::vector<double>& weights, const FeedOptions& options,
        std::uint64_t seed);
 
-  // Draws [first_draw, first_draw + options.batch). Throws std::runtime_error naming the sample when its
-  // picture cannot be decoded.
+  // This rank's part of the draws [first_draw, first_draw + options.batch). Throws std::runtime_error naming
+  // the sample when its picture cannot be decoded.
   FeedBatch batch(std::int64_t first_draw) const;
-  // The samples of a batch, for messages.
+  // The samples of a joint batch, for messages.
   std::vector<std::string> ids(std::int64_t first_draw) const;
   // The pools' species by name.
   const std::vector<std::string>& species() const { return species_; }
-  std::int64_t batch_size() const { return options_.batch; }
+  std::int64_t batch_size() const { return options_.batch; }  // of all ranks together
 
  private:
   void fill(FeedBatch& batch, std::int64_t slot) const;

@@ -75,6 +75,12 @@ ShardPool::ShardPool(std::string name, const std::vector<fs::path>& sources) : n
   }
 }
 
+std::vector<fs::path> ShardPool::files() const {
+  std::vector<fs::path> files;
+  for (const manifests::ShardReader& shard : shards_) files.push_back(shard.table().path());
+  return files;
+}
+
 ShardPool::Place ShardPool::locate(std::int64_t index) const {
   if (index < 0 || index >= size()) {
     throw std::out_of_range(fmt::format("pool {}: sample {} of {}", name_, index, size()));

@@ -41,6 +41,7 @@ class ShardPool {
 
   const std::string& name() const { return name_; }
   std::int64_t size() const { return first_.back(); }
+  std::vector<std::filesystem::path> files() const;  // the shards, in the order of their samples
   // Throw std::out_of_range for a sample that the pool lacks and std::runtime_error when a shard cannot be
   // read.
   TrainingSample sample(std::int64_t index) const;

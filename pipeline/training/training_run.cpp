@@ -19,10 +19,13 @@
 #include "model/encoder_trainer.h"
 #include "model/module_state.h"
 #include "model/priors.h"
+#include "model/process_group.h"
+#include "model/rank_place.h"
 #include "model/trainer.h"
 #include "pipeline/errors.h"
 #include "pipeline/interrupt.h"
 #include "pipeline/progress.h"
+#include "pipeline/training/rank_agreement.h"
 #include "pipeline/training/training_log.h"
 #include "pipeline/training/training_state.h"
 #include "pipeline/world/random.h"
@@ -48,11 +51,23 @@ fs::path made(const fs::path& folder) {
   return folder;
 }
 
-model::DeviceChoice choose_device(const TrainingNetworkConfig& network) {
-  const int cores = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-  model::configure_compute(network.compute_threads > 0 ? network.compute_threads : cores);
+model::RankPlace find_place() {
   try {
-    return model::choose_device(network.device);
+    return model::rank_place_from_environment();
+  } catch (const std::invalid_argument& error) {
+    throw ConfigError(error.what());
+  }
+}
+
+// Ranks of one machine share its cores.
+int own_cores(const model::RankPlace& place) {
+  return std::max(1, static_cast<int>(std::thread::hardware_concurrency()) / place.local_size);
+}
+
+model::DeviceChoice choose_device(const TrainingNetworkConfig& network, const model::RankPlace& place) {
+  model::configure_compute(network.compute_threads > 0 ? network.compute_threads : own_cores(place));
+  try {
+    return model::choose_device(network.device, place.local_rank);
   } catch (const std::invalid_argument& error) {
     throw ConfigError(error.what());
   }
@@ -102,8 +117,8 @@ std::shared_ptr<model::PrimaNet> initial_net(const TrainingNetworkConfig& networ
 }
 
 // What decides the weights, but for device and threads: assets, pools and the config without the keys that
-// only steer the run.
-std::string run_key(const TrainingConfig& config, const fs::path& out) {
+// only steer the run. `remember`: keep the digests in `out` for the next run.
+std::string run_key(const TrainingConfig& config, const fs::path& out, bool remember) {
   nlohmann::json settings = config.as_written;
   for (const char* key : {"checkpoint_every", "log_every", "feed_ahead", "divergence_factor", "stages"}) {
     settings.erase(key);
@@ -115,16 +130,19 @@ std::string run_key(const TrainingConfig& config, const fs::path& out) {
   for (const fs::path& path : {network.initial, network.encoders, network.smal_asset, network.priors}) {
     assets.push_back(path.empty() ? std::string() : digests.digest(path));
   }
-  digests.save();
   nlohmann::json phases = nlohmann::json::array();
   for (const PhaseConfig& phase : config.phases) {
     nlohmann::json pools = nlohmann::json::array();
     for (const PoolConfig& pool : phase.pools) {
-      pools.push_back({pool.name, ShardPool(pool.name, pool.shards).size(), pool.weight});
+      nlohmann::json shards = nlohmann::json::array();
+      for (const fs::path& file : ShardPool(pool.name, pool.shards).files())
+        shards.push_back(digests.digest(file));
+      pools.push_back({pool.name, shards, pool.weight});
     }
     phases.push_back({phase.name, phase.objective, phase.steps, phase.ief_iterations, phase.adversarial,
                       phase.learning_rate, phase.warm_up_steps, phase.decay, pools});
   }
+  if (remember) digests.save();
   return manifests::sha256(nlohmann::json{settings, assets, phases}.dump());
 }
 
@@ -156,12 +174,21 @@ model::EncoderTrainerOptions encoder_options(const TrainingConfig& config, const
   return options;
 }
 
-// One number for the draws of a phase and for LibTorch's generators at its start.
+// Of the draws of a phase.
 std::uint64_t phase_seed(const TrainingConfig& config, int phase_index) {
   return world::Rng(config.seed, {static_cast<std::uint64_t>(phase_index)}).next();
 }
 
-Feed open_feed(const TrainingConfig& config, const PhaseConfig& phase, int phase_index, int threads) {
+// Of dropout and stochastic depth in one step: ranks differ, and a resumed run needs no stored generator.
+std::uint64_t step_seed(const TrainingConfig& config, const TrainingPosition& position, int rank) {
+  return world::Rng(config.seed,
+                    {static_cast<std::uint64_t>(position.phase), static_cast<std::uint64_t>(position.step),
+                     static_cast<std::uint64_t>(rank)})
+      .next();
+}
+
+Feed open_feed(const TrainingConfig& config, const PhaseConfig& phase, int phase_index, int threads,
+               const model::Collective& ranks) {
   std::vector<ShardPool> pools;
   std::vector<double> weights;
   for (const PoolConfig& pool : phase.pools) {
@@ -170,6 +197,8 @@ Feed open_feed(const TrainingConfig& config, const PhaseConfig& phase, int phase
   }
   FeedOptions options = config.feed;
   options.threads = threads;
+  options.rank = ranks.rank();
+  options.ranks = ranks.size();
   try {
     // Phases draw from different streams.
     return {std::move(pools), weights, options, phase_seed(config, phase_index)};
@@ -183,17 +212,25 @@ class Run {
   Run(const TrainingConfig& config, const TrainingOptions& options)
       : config_(config),
         options_(options),
-        lock_(made(options.out)),
-        device_(choose_device(config.network)),
+        place_(find_place()),
+        device_(choose_device(config.network, place_)),
+        ranks_(model::join_ranks(place_, device_.device)),
+        lock_(leads() ? std::make_unique<manifests::FolderLock>(made(options.out)) : nullptr),
         asset_(smal::load_asset(config.network.smal_asset)),
         priors_(model::load_priors(smal::SafeTensors::open(config.network.priors), device_.device)),
-        key_(run_key(config, options.out)),
+        key_(run_key(config, options.out, /*remember=*/leads())),
         stored_(load_state(state_path(), key_)) {
-    manifests::remove_temporaries(options.out);
     if (stored_) position_ = stored_->position;
+    require_same_run(*ranks_, key_, position_);
+    if (!leads()) return;
+    manifests::remove_temporaries(options.out);
     if (options.quiet) return;
     if (!device_.warning.empty()) fmt::print(stderr, "warning: {}\n", device_.warning);
     fmt::print(stderr, "training on {}\n", device_.description);
+    if (ranks_->size() > 1) {
+      fmt::print(stderr, "{} ranks, each with {} of a batch's {} samples\n", ranks_->size(),
+                 config.feed.batch / ranks_->size(), config.feed.batch);
+    }
     if (stored_) {
       fmt::print(stderr, "going on at step {} of phase {}\n", position_.step, position_.phase + 1);
     }
@@ -201,9 +238,11 @@ class Run {
 
   TrainingSummary run() {
     TrainingSummary summary;
+    summary.rank = ranks_->rank();
     for (const PhaseConfig& phase : config_.phases) summary.steps_total += phase.steps;
-    TrainingLog log(options_.out / "log.jsonl", position_.phase, position_.step);
-    Progress progress("trained steps", summary.steps_total, options_.quiet);
+    std::optional<TrainingLog> log;
+    if (leads()) log.emplace(options_.out / "log.jsonl", position_.phase, position_.step);
+    Progress progress("trained steps", summary.steps_total, options_.quiet || !leads());
     progress.advance(steps_done(), /*from_earlier_run=*/true);
     auto net = initial_net(config_.network, asset_, device_.device);
     if (stored_) model::restore_parameters(stored_->file, "", *net);
@@ -214,10 +253,26 @@ class Run {
     summary.finished = position_.phase == static_cast<int>(config_.phases.size());
     summary.seconds = seconds_since(start_);
     if (summary.finished) summary.model = write_model(*net);
+    meet();
     return summary;
   }
 
  private:
+  // Rank 0 alone writes.
+  bool leads() const { return ranks_->rank() == 0; }
+
+  // No rank goes on before all are here.
+  void meet() const { ranks_->sum(torch::zeros({1})); }
+
+  bool any_rank_interrupted() const {
+    return ranks_->sum(torch::tensor({interrupted() ? 1 : 0})).item<int>() > 0;
+  }
+
+  void save(const model::Learner& learner) const {
+    if (leads()) save_state(state_path(), learner, position_, key_);
+    meet();  // a rank that ended earlier would make its launcher stop rank 0 while it writes
+  }
+
   fs::path state_path() const { return options_.out / "state.safetensors"; }
 
   std::int64_t steps_done() const {
@@ -235,64 +290,70 @@ class Run {
     try {
       if (phase.objective == "encoders") {
         return std::make_unique<model::EncoderTrainer>(
-            net, encoder_options(config_, phase, feed.species().size()));
+            net, encoder_options(config_, phase, feed.species().size()), ranks_);
       }
       return std::make_unique<model::Trainer>(net, smal::SmalBody(asset_, device_.device), priors_,
-                                              trainer_options(config_, phase));
+                                              trainer_options(config_, phase), ranks_);
     } catch (const std::invalid_argument& error) {
       throw ConfigError(fmt::format("phase \"{}\": {}", phase.name, error.what()));
     }
   }
 
   // The present phase, from the present step, to its end or until this call must stop.
-  std::shared_ptr<model::PrimaNet> run_phase(const std::shared_ptr<model::PrimaNet>& from, TrainingLog& log,
-                                             Progress& progress, TrainingSummary& summary) {
+  std::shared_ptr<model::PrimaNet> run_phase(const std::shared_ptr<model::PrimaNet>& from,
+                                             std::optional<TrainingLog>& log, Progress& progress,
+                                             TrainingSummary& summary) {
     const PhaseConfig& phase = config_.phases[static_cast<std::size_t>(position_.phase)];
     model::PrimaConfig sizes = from->config();
     sizes.ief_iterations = phase.ief_iterations;
     const auto net = model::with_config(*from, sizes);
-    torch::manual_seed(phase_seed(config_, position_.phase));
-    const Feed feed = open_feed(config_, phase, position_.phase, options_.threads);
+    const int threads = options_.threads == 0 && place_.size > 1 ? own_cores(place_) : options_.threads;
+    const Feed feed = open_feed(config_, phase, position_.phase, threads, *ranks_);
     const std::unique_ptr<model::Learner> learner = make_learner(net, phase, feed);
     if (stored_ && position_.step > 0) learner->restore(stored_->file);
     stored_.reset();
     FeedStream stream(feed, position_.step * feed.batch_size(), config_.feed_ahead);
     while (position_.step < phase.steps) {
-      if (interrupted()) {
-        save_state(state_path(), *learner, position_, key_);
+      if (any_rank_interrupted()) {
+        save(*learner);
         throw Interrupted("interrupted");
       }
       if (limit_reached(summary)) break;
       step(phase, *learner, feed, stream.next(), log, summary);
       progress.advance(1);
       if (position_.step % config_.checkpoint_every == 0 && position_.step < phase.steps) {
-        save_state(state_path(), *learner, position_, key_);
+        save(*learner);
       }
     }
     if (position_.step == phase.steps) position_ = {position_.phase + 1, 0, {}};
-    save_state(state_path(), *learner, position_, key_);
+    save(*learner);
     return net;
   }
 
   void step(const PhaseConfig& phase, model::Learner& learner, const Feed& feed, FeedBatch&& batch,
-            TrainingLog& log, TrainingSummary& summary) {
+            std::optional<TrainingLog>& log, TrainingSummary& summary) {
     const std::int64_t first_draw = batch.first_draw;
+    torch::manual_seed(step_seed(config_, position_, ranks_->rank()));
     const model::StepReport report = learner.step(to_tensors(std::move(batch)));
     const auto fault = position_.watch.check(report.loss, report.gradient_norm, config_.divergence_factor);
     if (fault) stop(phase, *fault, report, feed.ids(first_draw));
     ++position_.step;
     ++summary.steps_here;
     summary.last_loss = report.loss;
-    if (position_.step % config_.log_every != 0 && position_.step != phase.steps) return;
+    if (!log || (position_.step % config_.log_every != 0 && position_.step != phase.steps)) return;
     const double seconds = seconds_since(start_);
-    log.write({position_.phase, phase.name, position_.step, report.loss, report.gradient_norm,
-               report.learning_rate,
-               static_cast<double>(summary.steps_here * feed.batch_size()) / std::max(seconds, 1e-9), seconds,
-               report.terms});
+    log->write({position_.phase, phase.name, position_.step, report.loss, report.gradient_norm,
+                report.learning_rate,
+                static_cast<double>(summary.steps_here * feed.batch_size()) / std::max(seconds, 1e-9),
+                seconds, report.terms});
   }
 
   [[noreturn]] void stop(const PhaseConfig& phase, const std::string& fault, const model::StepReport& report,
                          const std::vector<std::string>& ids) const {
+    if (!leads()) {  // all ranks see the same loss; one message is enough
+      throw std::runtime_error(
+          fmt::format("rank {}: stopped for the reason that rank 0 gives", ranks_->rank()));
+    }
     std::string message = fmt::format(
         "training stopped at step {} of phase \"{}\": {}\nthe terms of the loss:", position_.step + 1,
         phase.name, fault);
@@ -307,6 +368,7 @@ class Run {
 
   fs::path write_model(const model::PrimaNet& net) const {
     const fs::path path = options_.out / "model.safetensors";
+    if (!leads()) return path;
     smal::NamedTensors tensors;
     model::append_parameters(tensors, "", net);
     if (config_.model_dtype == "float16") {
@@ -319,8 +381,10 @@ class Run {
   const TrainingConfig& config_;
   const TrainingOptions& options_;
   Clock::time_point start_ = Clock::now();
-  manifests::FolderLock lock_;
+  model::RankPlace place_;
   model::DeviceChoice device_;
+  std::shared_ptr<const model::Collective> ranks_;
+  std::unique_ptr<manifests::FolderLock> lock_;  // rank 0's
   smal::SmalAsset asset_;
   model::Priors priors_;
   std::string key_;

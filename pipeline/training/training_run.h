@@ -24,18 +24,22 @@ struct TrainingSummary {
   double seconds = 0.0;
   double last_loss = 0.0;       // of this call's last step
   std::filesystem::path model;  // the weights, once finished
+  int rank = 0;                 // of this process; rank 0 reports
 };
 
 // Writes into `out`:
-//   state.safetensors   the newest state: weights under their official names, optimisers, generators,
-//   position.
-//                       Replaced as a whole; usable as a checkpoint.
+//   state.safetensors   the newest state: weights under their official names, optimisers, position. Replaced
+//                       as a whole; usable as a checkpoint.
 //   log.jsonl           see docs/training.md
 //   model.safetensors   the weights alone, when the last phase is done
 // A run that was stopped or killed goes on from the newest state, with the weights that it would have had
-// anyway (same device, same compute threads). Throws ConfigError when `out` holds another configuration's
-// run, Interrupted on Ctrl-C after saving the state, and std::runtime_error naming the batch's sample ids
-// when loss or gradient are not finite or the loss diverges; the newest state then stays as it is.
+// anyway (same device, same compute threads, same number of ranks).
+//
+// Under a launcher of several ranks (model/rank_place.h) each calls this and trains on its part of every
+// batch; rank 0 alone writes, into a folder that all can read. Throws ConfigError when `out` holds another
+// configuration's run or the ranks do not fit each other, Interrupted on Ctrl-C after saving the state, and
+// std::runtime_error naming the batch's sample ids when loss or gradient are not finite or the loss diverges,
+// or when another rank is gone; the newest state then stays as it is.
 TrainingSummary train(const TrainingConfig& config, const TrainingOptions& options);
 
 }  // namespace q3d::pipeline

@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "loaders/augment.h"
+#include "loaders/encode.h"
 
 namespace q3d::loaders {
 namespace {
@@ -119,6 +120,15 @@ TEST(StoredCrop, refuses_what_it_cannot_crop) {
   EXPECT_THROW(make_stored_crop(rgb, cv::Mat(60, 81, CV_8UC1), {40, 30, 20}), std::invalid_argument);
   EXPECT_THROW(make_stored_crop(rgb, {}, {40, 30, 20}, 0.5), std::invalid_argument);
   EXPECT_THROW(make_stored_crop(rgb, {}, {40, 30, 20}, 1.9, 100), std::invalid_argument);
+}
+
+TEST(Encode, leaves_the_picture_as_it_was) {
+  const cv::Mat rgb = noise({40, 30}, CV_8UC3, 9);
+  const cv::Mat before = rgb.clone();
+  encode_jpeg(rgb, 90);
+  const std::vector<std::byte> png = encode_png(rgb);
+  EXPECT_EQ(cv::norm(rgb, before, cv::NORM_INF), 0.0);
+  EXPECT_EQ(cv::norm(decode_stored(png, 3), before, cv::NORM_INF), 0.0);
 }
 
 TEST(Augmentation, draws_follow_the_official_distributions) {

@@ -69,6 +69,9 @@ TEST(Config, ImpossibleSizesAreRefused) {
   EXPECT_NE(message_of({{"dec_layers", 1}}).find("at least 2"), std::string::npos);
   EXPECT_NE(message_of({{"depth", 0}}).find("'depth' = 0"), std::string::npos);
   EXPECT_NE(message_of({{"depth", -3}}).find("'depth' = -3"), std::string::npos);
+  EXPECT_NE(message_of({{"stem_depth", -1}}).find("[0, "), std::string::npos);
+  EXPECT_NE(message_of({{"clip_stem_depth", 2}, {"clip_width", 96}}).find("'clip_width' = 96"),
+            std::string::npos);
   EXPECT_NE(message_of({{"embed_dim", 1LL << 40}}).find("'embed_dim'"), std::string::npos);
   EXPECT_NE(message_of({{"focal_px", 0}}).find("'focal_px'"), std::string::npos);
   EXPECT_NE(message_of({{"dropout", 1.0}}).find("[0, 1)"), std::string::npos);

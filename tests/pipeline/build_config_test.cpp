@@ -64,6 +64,77 @@ TEST(BuildConfig, ReadsEveryKey) {
   EXPECT_EQ(limits.iterations_min, 5);
 }
 
+json own_labels() {
+  return json::parse(R"({"name": "lab", "format": "deeplabcut", "root": "r", "annotations": "labeled-data",
+    "topology": "goats.json", "species": "goat", "min_confidence": 0.25, "box_margin": 0.5})");
+}
+
+TEST(BuildConfig, ReadsLabelsOfOnesOwn) {
+  json document = good();
+  document["datasets"][0] = own_labels();
+  const DatasetConfig dataset = parse_build_config(document, "t").datasets[0];
+  EXPECT_EQ(dataset.topology, "goats.json");
+  EXPECT_EQ(dataset.species, "goat");
+  EXPECT_DOUBLE_EQ(dataset.min_confidence, 0.25);
+  EXPECT_DOUBLE_EQ(dataset.box_margin, 0.5);
+  for (const char* key : {"min_confidence", "box_margin", "species"}) document["datasets"][0].erase(key);
+  const DatasetConfig plain = parse_build_config(document, "t").datasets[0];
+  EXPECT_DOUBLE_EQ(plain.min_confidence, 0.6);
+  EXPECT_DOUBLE_EQ(plain.box_margin, 0.1);
+}
+
+TEST(BuildConfig, ReadsWhatIsToBeLeftOut) {
+  json document = good();
+  EXPECT_FALSE(parse_build_config(document, "t").leakage);
+  document["veto"] = "list.txt";
+  document["leakage"] = {{"test_sets", document["datasets"]}, {"max_distance", 3}};
+  const BuildConfig config = parse_build_config(document, "t");
+  EXPECT_EQ(config.veto, "list.txt");
+  ASSERT_TRUE(config.leakage);
+  EXPECT_EQ(config.leakage->max_distance, 3);
+  ASSERT_EQ(config.leakage->test_sets.size(), 1U);
+  EXPECT_EQ(config.leakage->test_sets[0].name, "a");
+}
+
+TEST(BuildConfig, EveryPathIsRelativeToItsFile) {
+  const testing::ScratchDir scratch;
+  json document = good();
+  document["datasets"][0] = own_labels();
+  document["datasets"][0]["curation"] = "chosen.csv";
+  document["veto"] = "list.txt";
+  document["leakage"] = {{"test_sets", document["datasets"]}};
+  std::ofstream(scratch.path() / "c.json") << document;
+  const BuildConfig config = load_build_config({scratch.path() / "c.json"});
+  EXPECT_EQ(config.veto, scratch.path() / "list.txt");
+  EXPECT_EQ(config.datasets[0].topology, scratch.path() / "goats.json");
+  EXPECT_EQ(config.datasets[0].curation, scratch.path() / "chosen.csv");
+  EXPECT_EQ(config.leakage->test_sets[0].root, scratch.path() / "r");
+  EXPECT_EQ(config.as_written["veto"], "list.txt");
+}
+
+TEST(BuildConfig, RefusesWhatLabelsOfOnesOwnCannotHave) {
+  const auto refusal = [](const char* key, const json& value) -> std::string {
+    json document = good();
+    document["datasets"][0] = own_labels();
+    if (value.is_null()) {
+      document["datasets"][0].erase(key);
+    } else {
+      document["datasets"][0][key] = value;
+    }
+    try {
+      parse_build_config(document, "t");
+    } catch (const ConfigError& error) {
+      return error.what();
+    }
+    return "accepted";
+  };
+  EXPECT_NE(refusal("topology", nullptr).find("\"topology\" is missing"), std::string::npos);
+  EXPECT_NE(refusal("min_confidence", 1.5).find("must be 0 to 1"), std::string::npos);
+  EXPECT_NE(refusal("box_margin", -1).find("must be 0 to 2"), std::string::npos);
+  EXPECT_NE(refusal("format", "superanimal").find("\"topology\" belongs to the formats"), std::string::npos);
+  EXPECT_NE(refusal("min_confidense", 0.5).find("did you mean \"min_confidence\""), std::string::npos);
+}
+
 // One good config, broken one key at a time.
 struct Mutation {
   const char* pointer;
@@ -87,7 +158,16 @@ TEST_P(BrokenConfig, IsRefusedWithTheReason) {
 INSTANTIATE_TEST_SUITE_P(
     Keys, BrokenConfig,
     ::testing::Values(
-        Mutation{"/nmae", "1", "did you mean \"name\"?"}, Mutation{"/name", "\"a/b\"", "becomes a folder"},
+        Mutation{"/nmae", "1", "did you mean \"name\"?"}, Mutation{"/veto", "3", "\"veto\" must be a string"},
+        Mutation{"/leakage", "{}", "\"test_sets\" must name at least one dataset"},
+        Mutation{"/leakage", "{\"test_sets\": 3}", "must be a list of objects"},
+        Mutation{"/leakage", "{\"test_sets\": [{\"name\": \"b\"}]}", "leakage: test_sets[0]"},
+        Mutation{
+            "/leakage",
+            "{\"test_sets\": [{\"name\": \"b\", \"format\": \"prima\", \"root\": \"r\", \"annotations\": "
+            "\"t\"}], \"max_distance\": 16}",
+            "\"max_distance\" must be 0 to 15"},
+        Mutation{"/name", "\"a/b\"", "becomes a folder"},
         Mutation{"/version", "\"1\"", "must look like 1.0.0"},
         Mutation{"/datasets", "[]", "at least one dataset"}, Mutation{"/datasets", "{}", "must be a list"},
         Mutation{"/datasets/0/format", "\"prma\"", "Did you mean \"prima\"?"},

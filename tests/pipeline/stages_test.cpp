@@ -26,7 +26,7 @@ struct Inputs {
     dataset.root = "r";
     dataset.annotations = "t";
     ingest.annotation_digests["a/train"] = "digest";
-    ingest.units.push_back({0, 0, 1, "unit"});
+    ingest.units.push_back({0, 0, 1, "unit", "unit"});
     limits().tau_low = 0.1;
     limits().tau_high = 0.2;
   }
@@ -55,11 +55,21 @@ TEST(StageKeys, AChangedTauKeepsPredictionsAndRedoesTheRest) {
 TEST(StageKeys, AddedPhotosMakeANewVersionFromTheSameUnits) {
   Inputs inputs;
   const StageKeys before = inputs.keys();
-  inputs.ingest.units.push_back({1, 1, 1, "more"});
+  inputs.ingest.units.push_back({1, 1, 1, "more", "more"});
   const StageKeys after = inputs.keys();
   EXPECT_NE(before.ingest, after.ingest);
   EXPECT_EQ(before.predict, after.predict);
   EXPECT_EQ(before.shards, after.shards);
+  EXPECT_NE(before.dataset, after.dataset);
+}
+
+TEST(StageKeys, ALeftOutSampleMakesANewVersionFromTheSamePredictions) {
+  Inputs inputs;
+  const StageKeys before = inputs.keys();
+  inputs.ingest.units[0].label_digest = "without one";
+  const StageKeys after = inputs.keys();
+  EXPECT_EQ(before.predict, after.predict);
+  EXPECT_EQ(before.refine, after.refine);
   EXPECT_NE(before.dataset, after.dataset);
 }
 

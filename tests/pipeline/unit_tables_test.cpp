@@ -42,8 +42,22 @@ TEST(UnitTables, PredictionsSurviveTheDisk) {
   samples[0] = {manifests::Reason::none, "", 640, 480, true, numbered(0)};
   samples[1] = {manifests::Reason::image_truncated, "ends at byte 17", 0, 0, false, {}};
   samples[2] = {manifests::Reason::none, "", 1, 2, false, numbered(1000)};
-  manifests::write_table(scratch.path() / "t.h5", to_table(samples));
-  const auto back = predicted_from_table(manifests::read_table(scratch.path() / "t.h5"));
+  std::vector<Candidate> candidates(3);
+  candidates[2].record.id = "set/train/a.png#2";
+  candidates[2].record.image_ref = "a.png";
+  candidates[2].record.box = {1.5, 2.5, 3.5, 4.5};
+  candidates[2].record.keypoints[25] = {7.25, 8.25, 2.0F, 0.5F};
+  manifests::write_table(scratch.path() / "t.h5", to_table(candidates, samples));
+  const manifests::Table table = manifests::read_table(scratch.path() / "t.h5");
+  const manifests::SampleRecord asked = candidate_from_table(table, 2);
+  EXPECT_EQ(asked.id, "set/train/a.png#2");
+  EXPECT_EQ(asked.image_ref, "a.png");
+  EXPECT_EQ(asked.box.w_px, 3.5);
+  EXPECT_EQ(asked.keypoints[25].y_px, 8.25);
+  EXPECT_EQ(asked.keypoints[25].v, 2.0F);
+  EXPECT_EQ(asked.keypoints[25].weight, 0.5F);
+  EXPECT_EQ(asked.keypoints[24].weight, 0.0F);
+  const auto back = predicted_from_table(table);
   ASSERT_EQ(back.size(), samples.size());
   for (std::size_t i = 0; i < samples.size(); ++i) {
     EXPECT_EQ(back[i].failure, samples[i].failure);
@@ -108,7 +122,7 @@ TEST(UnitTables, AnEmptyUnitIsATable) {
 }
 
 TEST(UnitTables, AMissingColumnIsNamed) {
-  manifests::Table table = to_table(std::vector<PredictedSample>(1));
+  manifests::Table table = to_table(std::vector<Candidate>(1), std::vector<PredictedSample>(1));
   table.numeric.erase("betas");
   try {
     predicted_from_table(table);

@@ -19,6 +19,17 @@ inline std::filesystem::path parity_dir() {
   return given != nullptr && *given != '\0' ? std::filesystem::path(given) : data_dir() / "parity";
 }
 
+// What the project ships beside its code.
+inline std::filesystem::path source_dir() {
+  return data_dir().parent_path().parent_path();
+}
+
+// Samples of the real datasets, which cannot be shipped: the folder that Q3D_SAMPLES_DIR names, or nothing.
+inline std::filesystem::path samples_dir() {
+  const char* given = std::getenv("Q3D_SAMPLES_DIR");
+  return given != nullptr ? given : "";
+}
+
 // A fresh, empty folder for one test; removed when the object goes.
 class ScratchDir {
  public:

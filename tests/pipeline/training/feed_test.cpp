@@ -93,6 +93,26 @@ TEST_F(FeedTest, BytesDoNotDependOnThreadsNorOnWhatWasReadAhead) {
   expect_equal(resumed.next(), alone);
 }
 
+TEST_F(FeedTest, RanksShareEveryBatch) {
+  const FeedBatch whole = feed({.batch = 6}).batch(12);
+  for (const int rank : {0, 1, 2}) {
+    const Feed source = feed({.batch = 6, .rank = rank, .ranks = 3});
+    const FeedBatch part = source.batch(12);
+    ASSERT_EQ(part.size, 2);
+    EXPECT_EQ(part.first_draw, 12);
+    EXPECT_TRUE(std::equal(part.images.get(), part.images.get() + 2 * kImageNumbers,
+                           whole.images.get() + static_cast<std::size_t>(2 * rank) * kImageNumbers));
+    EXPECT_TRUE(std::equal(part.keypoints_2d.begin(), part.keypoints_2d.end(),
+                           whole.keypoints_2d.begin() + rank * 156));
+    EXPECT_TRUE(std::equal(part.has_pose.begin(), part.has_pose.end(), whole.has_pose.begin() + rank * 2));
+    // Messages name the whole batch, and the next one follows it.
+    EXPECT_EQ(source.ids(12), feed({.batch = 6}).ids(12));
+    EXPECT_EQ(source.batch_size(), 6);
+  }
+  EXPECT_THROW(feed({.batch = 7, .ranks = 3}), std::invalid_argument);
+  EXPECT_THROW(feed({.batch = 6, .rank = 3, .ranks = 3}), std::invalid_argument);
+}
+
 TEST_F(FeedTest, AnotherSeedDrawsOtherBatches) {
   const FeedBatch a = feed({.batch = 6}, 1).batch(0), b = feed({.batch = 6}, 2).batch(0);
   EXPECT_NE(a.keypoints_2d, b.keypoints_2d);

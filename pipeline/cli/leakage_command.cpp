@@ -1,0 +1,93 @@
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include <cstdio>
+#include <memory>
+
+#include "pipeline/cli/commands.h"
+#include "pipeline/leakage_run.h"
+#include "pipeline/progress.h"
+
+namespace q3d::pipeline::cli {
+namespace {
+
+struct Arguments {
+  std::vector<std::filesystem::path> configs;
+  RunOptions run;
+  bool json = false;
+};
+
+std::size_t count_leaks(const LeakageRunSummary& summary) {
+  std::size_t count = 0;
+  for (const auto& [evidence, leaks] : summary.leaks_by_evidence) count += leaks;
+  return count;
+}
+
+void print_summary(const LeakageRunSummary& summary, const std::filesystem::path& out) {
+  for (const std::string& note : summary.notes) fmt::print(stderr, "note: {}\n", note);
+  fmt::print(stderr, "\n{} pictures of {} candidates compared with {} test pictures in {}\n",
+             summary.pool_pictures, summary.candidates, summary.test_pictures,
+             human_duration(summary.seconds));
+  fmt::print(stderr, "  candidates whose picture is in a test set: {}\n", count_leaks(summary));
+  for (const auto& [evidence, leaks] : summary.leaks_by_evidence) {
+    fmt::print(stderr, "    {:<12} {}\n", evidence, leaks);
+  }
+  fmt::print(stderr, "  groups of pictures of the pool that are alike: {} ({} pictures)\n", summary.groups,
+             summary.pictures_in_groups);
+  fmt::print(stderr, "  to look at: {}\n  lists: leaks.csv, duplicates.csv and leakage.json beside it\n",
+             (out / "leakage.html").string());
+  if (summary.test_pictures == 0) {
+    fmt::print(stderr, "next: name the test sets under \"leakage\" in the config (docs/config.md)\n");
+  } else {
+    fmt::print(stderr,
+               "next: quadruped3d build with the same config leaves the pseudo labels among them out\n");
+  }
+}
+
+}  // namespace
+
+Command add_leakage(CLI::App& app) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command =
+      app.add_subcommand("leakage", "pictures of the pool that are in a test set too, or twice in the pool");
+  command->add_option("-c,--config", arguments->configs, "JSON config; a second one is laid over the first")
+      ->required()
+      ->check(CLI::ExistingFile);
+  command
+      ->add_option("-o,--out", arguments->run.out, "folder for the lists, the page and the cache of hashes")
+      ->required();
+  command->add_option("-t,--threads", arguments->run.threads, "threads that read and decode (0 = all cores)")
+      ->check(CLI::NonNegativeNumber);
+  command->add_flag("--json", arguments->json, "print a machine-readable summary on stdout");
+  command->add_flag("-q,--quiet", arguments->run.quiet, "no progress");
+  command->footer(
+      "Examples:\n"
+      "  quadruped3d leakage --config my.json --out out\n"
+      "where my.json is a build's config with\n"
+      "  \"leakage\": { \"test_sets\": [ { \"name\": \"animal3d\", \"format\": \"prima\", \"root\": "
+      "\"animal3d\",\n"
+      "                                \"annotations\": \"test.json\", \"split\": \"test\" } ] }\n"
+      "A copy is known by its bytes, by its ImageNet, COCO or VOC name, or by what it shows (resized, "
+      "recompressed,\n"
+      "mirrored; not cut out). Hashes are kept in the folder: give the build's own, and it finds them "
+      "there.");
+  return [arguments] {
+    const LeakageRunSummary summary = run_leakage(load_build_config(arguments->configs), arguments->run);
+    print_summary(summary, arguments->run.out);
+    if (arguments->json) {
+      const nlohmann::ordered_json document = {{"candidates", summary.candidates},
+                                               {"pool_pictures", summary.pool_pictures},
+                                               {"test_pictures", summary.test_pictures},
+                                               {"leaks", count_leaks(summary)},
+                                               {"leaks_by_evidence", summary.leaks_by_evidence},
+                                               {"groups", summary.groups},
+                                               {"pictures_in_groups", summary.pictures_in_groups},
+                                               {"seconds", summary.seconds}};
+      fmt::print("{}\n", document.dump());
+    }
+    return 0;
+  };
+}
+
+}  // namespace q3d::pipeline::cli
