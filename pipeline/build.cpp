@@ -33,7 +33,10 @@ class UnitBuilder {
         judgements_(workspace.ingest().candidates.size()),
         progress_("candidates", static_cast<std::int64_t>(workspace.ingest().candidates.size()),
                   workspace.quiet()) {
-    if (!keys.measure.empty()) measurements_.emplace(workspace.out(), "measure", keys.measure);
+    // By the labels' digest: what a veto leaves out is not measured.
+    if (!keys.measure.empty()) {
+      measurements_.emplace(workspace.out(), "measure", keys.measure, &Unit::label_digest);
+    }
   }
 
   void run() {

@@ -10,7 +10,19 @@ ordered_json dataset_json(const DatasetConfig& dataset) {
                          {"root", dataset.root.string()}, {"annotations", dataset.annotations.string()},
                          {"split", dataset.split},        {"role", to_string(dataset.role)}};
   if (!dataset.images.empty()) object["images"] = dataset.images.string();
+  if (!dataset.curation.empty()) object["curation"] = dataset.curation.string();
+  if (dataset.topology.empty()) return object;
+  object["topology"] = dataset.topology.string();
+  object["species"] = dataset.species;
+  object["min_confidence"] = dataset.min_confidence;
+  object["box_margin"] = dataset.box_margin;
   return object;
+}
+
+ordered_json datasets_json(const std::vector<DatasetConfig>& datasets) {
+  ordered_json list = ordered_json::array();
+  for (const DatasetConfig& dataset : datasets) list.push_back(dataset_json(dataset));
+  return list;
 }
 
 ordered_json network_json(const NetworkConfig& network) {
@@ -66,12 +78,15 @@ ordered_json effective_guards(const GuardConfig& guards) {
 }
 
 ordered_json effective_config(const BuildConfig& config) {
-  ordered_json datasets = ordered_json::array();
-  for (const DatasetConfig& dataset : config.datasets) datasets.push_back(dataset_json(dataset));
   ordered_json object = {{"name", config.name},
                          {"version", config.version},
                          {"profile", config.profile},
-                         {"datasets", std::move(datasets)}};
+                         {"datasets", datasets_json(config.datasets)}};
+  if (!config.veto.empty()) object["veto"] = config.veto.string();
+  if (config.leakage) {
+    object["leakage"] = {{"test_sets", datasets_json(config.leakage->test_sets)},
+                         {"max_distance", config.leakage->max_distance}};
+  }
   if (!config.network.checkpoint.empty()) object["network"] = network_json(config.network);
   object["tta"] = tta_json(config.tta);
   object["filter"] = filter_json(config.filter);

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <map>
 #include <optional>
+#include <set>
 #include <stdexcept>
 
 #include "loaders/crop.h"
@@ -43,6 +44,8 @@ struct Evidence {
   std::optional<Projection> before;
   std::optional<Projection> after;
   std::vector<double> curve;
+  std::vector<double> held_out_curve;
+  std::optional<filters::LabelMeasures> measures;
   std::vector<std::string> missing;
 };
 
@@ -116,7 +119,14 @@ void read_stages(const fs::path& folder, const json& dataset, const VerdictLine&
   for (RefinedSample& each : refined_from_table(*refined)) {
     if (each.sample != row) continue;
     evidence.curve = std::move(each.curve);
+    evidence.held_out_curve = std::move(each.held_out_curve);
     evidence.after = each.body.keypoints_2d;
+  }
+  if (dataset.at("provenance").at("stage_keys").at("measure").is_null()) return;
+  const auto measured = stage_table(folder, dataset, "measure", unit);
+  if (!measured) return;
+  for (const MeasuredLabel& each : measured_from_table(*measured)) {
+    if (each.sample == row) evidence.measures = each.measures;
   }
 }
 
@@ -163,6 +173,15 @@ ordered_json describe_crop(const manifests::SampleRecord& record) {
           {"patch_from_image", loaders::patch_from_image(square, loaders::kPatchSidePx)}};
 }
 
+// What the guards' bounds looked at; null where there was nothing to measure or the bound is off.
+ordered_json describe_measures(const filters::LabelMeasures& measures) {
+  return {{"visible", measures.visible},
+          {"pose_deviation", number_or_null(measures.pose_deviation)},
+          {"limb_factor", number_or_null(measures.limb_factor)},
+          {"left_right", number_or_null(measures.left_right)},
+          {"mask_iou", number_or_null(measures.mask_iou)}};
+}
+
 ordered_json describe_verdict(const VerdictLine& line) {
   ordered_json verdict = {
       {"verdict", line.at("verdict")}, {"reason", line.at("reason")}, {"detail", line.at("detail")}};
@@ -182,6 +201,19 @@ ordered_json describe_source(const VerdictLine& line, const Evidence& evidence) 
           {"image_sha256", line.at("image_sha256")}};
 }
 
+// Those of the candidate's dataset; null where its labels are no predictions.
+json thresholds_of(const json& dataset, const std::string& name) {
+  const json& all = dataset.at("thresholds");
+  return all.is_object() && all.contains(name) ? all.at(name) : json(nullptr);
+}
+
+bool is_from_a_guard(const std::string& reason) {
+  static const std::set<std::string> kReasons{
+      "too_few_keypoints", "scaled_gain_too_small", "held_out_not_better", "pose_implausible",
+      "limbs_implausible", "left_right_swapped",    "mask_mismatch"};
+  return kReasons.count(reason) > 0;
+}
+
 // What decided, in the numbers of this sample.
 std::string why(const ordered_json& verdict, const json& thresholds) {
   const auto text = [&](const char* key) { return verdict.at(key).get<std::string>(); };
@@ -191,6 +223,7 @@ std::string why(const ordered_json& verdict, const json& thresholds) {
   if (verdict.at("initial_error").is_null()) {
     return "Its label comes from the annotation file; the fidelity rule judges predictions only.";
   }
+  if (is_from_a_guard(text("reason"))) return "A guard left it out: " + text("detail") + ".";
   const double error = verdict.at("initial_error").get<double>();
   const double low = thresholds.at("tau_low").get<double>();
   const double high = thresholds.at("tau_high").get<double>();
@@ -237,8 +270,9 @@ ordered_json explain(const fs::path& given, const std::string& id) {
 
   ordered_json story = {{"id", id}, {"dataset", fs::canonical(folder).filename().string()}};
   story["verdict"] = describe_verdict(line);
-  story["thresholds"] = dataset.at("thresholds");
-  story["why"] = why(story["verdict"], dataset.at("thresholds"));
+  const json thresholds = thresholds_of(dataset, line.at("dataset"));
+  story["thresholds"] = thresholds;
+  story["why"] = why(story["verdict"], thresholds);
   story["source"] = describe_source(line, evidence);
   if (!evidence.record.id.empty() && evidence.record.box.w_px > 0) {
     story["crop"] = describe_crop(evidence.record);
@@ -248,6 +282,8 @@ ordered_json explain(const fs::path& given, const std::string& id) {
     story["curve"] = ordered_json::array();
     for (const double error : evidence.curve) story["curve"].push_back(number_or_null(error));
   }
+  if (!evidence.held_out_curve.empty()) story["held_out_curve"] = evidence.held_out_curve;
+  if (evidence.measures) story["measures"] = describe_measures(*evidence.measures);
   if (!line.at("shard").empty()) {
     story["label"] = {{"shard", fmt::format("shards/{:06}.h5", std::stoll(line.at("shard")))},
                       {"row", std::stoll(line.at("row"))}};
