@@ -6,8 +6,10 @@ CONFIG ?=
 JOBS   ?= $(shell nproc)
 SCHEDULE ?= full
 SEED     ?= 0
+FUZZ_SECONDS ?= 60
+FUZZ_TARGETS ?=
 
-.PHONY: quadruped3d sample-model sample-loop test program build setup assets format bench asan clean help
+.PHONY: quadruped3d sample-model sample-loop test program build setup assets format bench asan fuzz clean help
 
 quadruped3d: program  ## build the dataset that CONFIG describes (default: the rendered sample world)
 	tools/quadruped3d.sh $(OUT) $(CONFIG)
@@ -44,6 +46,11 @@ bench: setup  ## build the benchmarks (bench/README.md says how to run them)
 
 asan:  ## all tests under the address and undefined-behaviour sanitizers
 	$(MAKE) test PRESET=asan
+
+fuzz:  ## fuzz every reader of files for FUZZ_SECONDS each (clang; tests/fuzz)
+	cmake --preset fuzz
+	cmake --build build/fuzz --parallel $(JOBS) --target fuzz_targets
+	tools/fuzz.sh build/fuzz $(FUZZ_SECONDS) $(FUZZ_TARGETS)
 
 format:  ## format every source in place
 	git ls-files '*.h' '*.cpp' | xargs clang-format -i

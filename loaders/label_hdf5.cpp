@@ -13,7 +13,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cstring>
 #include <stdexcept>
 
@@ -303,13 +302,9 @@ void read_rows(const PandasGroup& group, LabelTable& table) {
 std::string frame_group(hid_t file) {
   constexpr const char* kUsual = "df_with_missing";
   if (H5Lexists(file, kUsual, H5P_DEFAULT) > 0) return kUsual;
-  H5G_info_t root{};
-  check(H5Gget_info(file, &root), "root group");
-  if (root.nlinks != 1) refuse("root group", fmt::format("{} members", root.nlinks), kUsual);
-  std::array<char, 256> name{};
-  check(H5Lget_name_by_idx(file, ".", H5_INDEX_NAME, H5_ITER_INC, 0, name.data(), name.size(), H5P_DEFAULT),
-        "root group");
-  return name.data();
+  const std::vector<std::string> names = manifests::hdf5::link_names(file, "root group");
+  if (names.size() != 1) refuse("root group", fmt::format("{} members", names.size()), kUsual);
+  return names.front();
 }
 
 LabelTable read_open_file(hid_t file, std::uint64_t file_bytes) {

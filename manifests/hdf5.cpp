@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <new>
 #include <stdexcept>
 
 namespace q3d::manifests::hdf5 {
@@ -17,6 +19,14 @@ herr_t take_innermost(unsigned depth, const H5E_error2_t* error, void* out) {
   return 0;
 }
 
+// No exception may cross the library.
+herr_t take_name(hid_t, const char* name, const H5L_info_t*, void* out) try {
+  static_cast<std::vector<std::string>*>(out)->emplace_back(name);
+  return 0;
+} catch (const std::bad_alloc&) {
+  return -1;
+}
+
 }  // namespace
 
 Session::Session() : lock_(library_mutex()) {
@@ -28,6 +38,13 @@ void throw_error(const std::string& what) {
   H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, take_innermost, &reason);
   H5Eclear2(H5E_DEFAULT);
   throw std::runtime_error(fmt::format("{}: {}", what, reason));
+}
+
+std::vector<std::string> link_names(hid_t group, const std::string& what) {
+  std::vector<std::string> names;
+  check(H5Literate(group, H5_INDEX_NAME, H5_ITER_NATIVE, nullptr, take_name, &names), what);
+  std::sort(names.begin(), names.end());
+  return names;
 }
 
 }  // namespace q3d::manifests::hdf5

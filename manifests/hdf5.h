@@ -6,6 +6,7 @@
 #include <mutex>
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace q3d::manifests::hdf5 {
 
@@ -46,5 +47,11 @@ class Handle {
   hid_t id_;
   herr_t (*close_)(hid_t);
 };
+
+// The names in a group, sorted. Throws as check() does.
+//
+// HDF5 1.10 frees memory that it never set when a damaged group cannot be listed by index, or in another
+// order than the file's own; so this walks in native order, and other code should not list by index either.
+std::vector<std::string> link_names(hid_t group, const std::string& what);
 
 }  // namespace q3d::manifests::hdf5

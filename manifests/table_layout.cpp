@@ -107,22 +107,6 @@ Layout read_layout(const std::string& name, hid_t file, std::uint64_t file_bytes
   return layout;
 }
 
-std::vector<std::string> link_names(hid_t file) {
-  H5G_info_t group{};
-  check(H5Gget_info(file, &group), "root group");
-  std::vector<std::string> names;
-  for (hsize_t i = 0; i < group.nlinks; ++i) {
-    const auto name_at = [&](char* out, std::size_t size) {
-      return check(H5Lget_name_by_idx(file, ".", H5_INDEX_NAME, H5_ITER_INC, i, out, size, H5P_DEFAULT),
-                   "dataset names");
-    };
-    std::string name(static_cast<std::size_t>(name_at(nullptr, 0)), '\0');
-    name_at(name.data(), name.size() + 1);
-    names.push_back(std::move(name));
-  }
-  return names;
-}
-
 std::int64_t read_rows(hid_t file) {
   if (check(H5Aexists(file, "rows"), "rows") == 0) {
     refuse("rows", "the attribute is absent, so this HDF5 file is not one of this program's tables");
@@ -145,8 +129,10 @@ std::map<std::string, std::string> read_attributes(hid_t file, std::uint64_t fil
   check(H5Oget_info(file, &root), "root group");
   std::map<std::string, std::string> attributes;
   for (hsize_t i = 0; i < root.num_attrs; ++i) {
-    const Handle attribute(H5Aopen_by_idx(file, ".", H5_INDEX_NAME, H5_ITER_INC, i, H5P_DEFAULT, H5P_DEFAULT),
-                           H5Aclose, "attributes");
+    // In native order, for the reason that link_names() gives.
+    const Handle attribute(
+        H5Aopen_by_idx(file, ".", H5_INDEX_NAME, H5_ITER_NATIVE, i, H5P_DEFAULT, H5P_DEFAULT), H5Aclose,
+        "attributes");
     std::string name(static_cast<std::size_t>(check(H5Aget_name(attribute.get(), 0, nullptr), "attributes")),
                      '\0');
     check(H5Aget_name(attribute.get(), name.size() + 1, name.data()), "attributes");
@@ -197,7 +183,7 @@ std::map<std::string, TableReader::Column> read_columns(hid_t hdf5_file, const F
   const std::uint64_t file_bytes = file.size();
   std::map<std::string, Layout> layouts;
   std::uint64_t total = 0;
-  for (const std::string& name : link_names(hdf5_file)) {
+  for (const std::string& name : hdf5::link_names(hdf5_file, "dataset names")) {
     const Layout& layout = layouts[name] = read_layout(name, hdf5_file, file_bytes);
     total += static_cast<std::uint64_t>(layout.bytes);
     // Datasets that share bytes could claim the file's size many times over.

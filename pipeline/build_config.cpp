@@ -3,8 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <regex>
+#include <cctype>
 #include <set>
+#include <string_view>
 
 #include "filters/near_duplicates.h"
 #include "pipeline/config_layers.h"
@@ -19,6 +20,20 @@ namespace fs = std::filesystem;
 
 void require(bool holds, const std::string& where, const std::string& what) {
   if (!holds) throw ConfigError(where + ": " + what);
+}
+
+// What may become a file's name.
+bool is_plain_name(std::string_view text) {
+  return !text.empty() && std::all_of(text.begin(), text.end(), [](unsigned char c) {
+    return std::isalnum(c) != 0 || c == '_' || c == '.' || c == '-';
+  });
+}
+
+bool is_version(std::string_view text) {
+  const auto dots = std::count(text.begin(), text.end(), '.');
+  const bool only_digits_and_dots = text.find_first_not_of("0123456789.") == std::string_view::npos;
+  return dots == 2 && only_digits_and_dots && text.front() != '.' && text.back() != '.' &&
+         text.find("..") == std::string_view::npos;
 }
 
 // What only labels of one's own need: their keypoints are not known beforehand.
@@ -62,7 +77,7 @@ DatasetConfig parse_dataset(const json& object, const std::string& where) {
   read_label_options(fields, options);
   fields.finish();
   require_one_of(options.format, loaders::dataset_formats(), where + ": format");
-  require(std::regex_match(options.name, std::regex("[A-Za-z0-9_.-]+")), where,
+  require(is_plain_name(options.name), where,
           "\"name\" may hold letters, digits, '.', '_' and '-' only, got \"" + options.name + "\"");
   require_one_of(role, role_names(), where + ": role");
   options.role = role_from_string(role);
@@ -299,9 +314,9 @@ BuildConfig parse_build_config(const json& merged, const std::string& where) {
     parse_calibrate(*shares, where + ": calibrate", config.calibrate);
   }
   fields.finish();
-  require(std::regex_match(config.name, std::regex("[A-Za-z0-9_.-]+")), where,
+  require(is_plain_name(config.name), where,
           "\"name\" becomes a folder's name: letters, digits, '.', '_' and '-' only");
-  require(std::regex_match(config.version, std::regex("[0-9]+\\.[0-9]+\\.[0-9]+")), where,
+  require(is_version(config.version), where,
           "\"version\" must look like 1.0.0, got \"" + config.version + "\"");
   std::set<std::string> seen;
   for (const auto& dataset : config.datasets) {

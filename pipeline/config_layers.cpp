@@ -14,10 +14,20 @@ namespace {
 using nlohmann::json;
 namespace fs = std::filesystem;
 
+// Merging and printing recurse, so a file must not be able to choose how deep.
+constexpr int kMaxDepth = 32;
+
 json read_json(const fs::path& file) {
+  const auto check_depth = [&](int depth, json::parse_event_t, json&) {
+    if (depth <= kMaxDepth) return true;
+    throw ConfigError(
+        fmt::format("{}: got objects or lists within each other beyond {} levels, expected at "
+                    "most that",
+                    file.string(), kMaxDepth));
+  };
   try {
-    return json::parse(manifests::read_file(file), nullptr, true, /*ignore_comments=*/true);
-  } catch (const json::parse_error& error) {
+    return json::parse(manifests::read_file(file), check_depth, true, /*ignore_comments=*/true);
+  } catch (const json::exception& error) {  // also numbers beyond double, which are no parse_error
     throw ConfigError(fmt::format("{}: not valid JSON: {}", file.string(), error.what()));
   } catch (const std::runtime_error& error) {
     throw ConfigError(error.what());

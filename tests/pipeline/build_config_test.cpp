@@ -14,6 +14,7 @@ namespace q3d::pipeline {
 namespace {
 
 using nlohmann::json;
+namespace fs = std::filesystem;
 
 json good() {
   return json::parse(R"({
@@ -169,6 +170,10 @@ INSTANTIATE_TEST_SUITE_P(
             "\"max_distance\" must be 0 to 15"},
         Mutation{"/name", "\"a/b\"", "becomes a folder"},
         Mutation{"/version", "\"1\"", "must look like 1.0.0"},
+        Mutation{"/version", "\"1..0\"", "must look like 1.0.0"},
+        Mutation{"/version", "\"1.0.0.0\"", "must look like 1.0.0"},
+        Mutation{"/version", "\"1.0.\"", "must look like 1.0.0"},
+        Mutation{"/version", "\"1.0.x\"", "must look like 1.0.0"},
         Mutation{"/datasets", "[]", "at least one dataset"}, Mutation{"/datasets", "{}", "must be a list"},
         Mutation{"/datasets/0/format", "\"prma\"", "Did you mean \"prima\"?"},
         Mutation{"/datasets/0/rot", "\"x\"", "did you mean \"root\"?"},
@@ -291,14 +296,40 @@ TEST(BuildConfig, LayersAndPathsRelativeToTheirFile) {
             "s.safetensors");  // no path of this machine is recorded
 }
 
+TEST(BuildConfig, LongTextsAndDeepNestingAreRefusedWithoutRecursion) {
+  json config = good();
+  config["name"] = std::string(1'000'000, 'a');
+  EXPECT_NO_THROW(parse_build_config(config, "t"));
+  config["version"] = std::string(1'000'000, '1');
+  EXPECT_THROW(parse_build_config(config, "t"), ConfigError);
+  const testing::ScratchDir scratch;
+  const fs::path file = scratch.path() / "deep.json";
+  for (const auto& [open, close] : {std::pair("{\"tta\":", "}"), std::pair("[", "]")}) {
+    std::string text = "{\"tta\": ";
+    for (int i = 0; i < 200'000; ++i) text += open;
+    text += "1";
+    for (int i = 0; i < 200'000; ++i) text += close;
+    std::ofstream(file) << text + "}";
+    try {
+      load_build_config({file});
+      FAIL();
+    } catch (const ConfigError& error) {
+      EXPECT_NE(std::string(error.what()).find("beyond 32 levels"), std::string::npos) << error.what();
+    }
+  }
+}
+
 TEST(BuildConfig, BrokenJsonNamesTheFile) {
   const testing::ScratchDir scratch;
-  std::ofstream(scratch.path() / "cut.json") << R"({"name": "q", "datasets": [)";
-  try {
-    load_build_config({scratch.path() / "cut.json"});
-    FAIL();
-  } catch (const ConfigError& error) {
-    EXPECT_NE(std::string(error.what()).find("cut.json: not valid JSON"), std::string::npos) << error.what();
+  for (const char* text : {R"({"name": "q", "datasets": [)", R"({"tta": {"learning_rate": 1e999}})"}) {
+    std::ofstream(scratch.path() / "cut.json") << text;
+    try {
+      load_build_config({scratch.path() / "cut.json"});
+      FAIL() << text;
+    } catch (const ConfigError& error) {
+      EXPECT_NE(std::string(error.what()).find("cut.json: not valid JSON"), std::string::npos)
+          << error.what();
+    }
   }
 }
 

@@ -1,0 +1,40 @@
+// DeepLabCut's files: HDF5 and CSV, told apart by content.
+#include "loaders/dataset.h"
+#include "loaders/label_table.h"
+#include "tests/fuzz/fuzz_input.h"
+
+// HDF5 1.10 leaks memory of its own when it refuses a damaged file.
+extern "C" const char* __lsan_default_suppressions() {
+  return "leak:libhdf5";
+}
+
+namespace {
+
+// Of the tables in tests/data/deeplabcut.
+constexpr const char* kTopology = R"({"name": "goats", "keypoints": ["eye_l", "eye_r", "snout", "horn"],
+  "flip_pairs": [["eye_l", "eye_r"]],
+  "animal3d26": {"left_eye": "eye_l", "right_eye": "eye_r", "nose": "snout"}})";
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using q3d::fuzz::require;
+  static const q3d::fuzz::Scratch scratch;
+  static const auto topology = scratch.write("topology.json", kTopology);
+  const auto file = scratch.write("labels.h5", q3d::fuzz::as_text(data, size));
+  q3d::loaders::DatasetOptions options{.name = "lab",
+                                       .format = "deeplabcut",
+                                       .split = "train",
+                                       .root = scratch.root(),
+                                       .annotations = "labels.h5",
+                                       .images = {}};
+  options.topology = topology;
+  q3d::fuzz::value_or_refusal(file, [&] {
+    const q3d::loaders::LabelTable table = q3d::loaders::read_label_table(file);
+    require(table.values.size() == table.rows.size() * table.columns.size(), "a table is whole");
+    for (const auto& record : load_dataset(options).records) {
+      require(!record.id.empty(), "a record has an id");
+    }
+  });
+  return 0;
+}

@@ -1,0 +1,29 @@
+#!/usr/bin/env bash
+# Fuzzes every target for SECONDS (default 60) each: tools/fuzz.sh BUILD_FOLDER [SECONDS] [TARGET...]
+# What libFuzzer breeds stays in BUILD_FOLDER/corpus, so that the next run goes on from there. An input that breaks a
+# promise is kept in BUILD_FOLDER/findings; the run then ends with its name and the command that repeats it.
+set -euo pipefail
+build=$1
+seconds=${2:-60}
+wanted=("${@:3}")
+here=$(cd "$(dirname "$0")/.." && pwd)
+
+while read -r name inputs; do
+  if ((${#wanted[@]} > 0)) && [[ " ${wanted[*]} " != *" $name "* ]]; then continue; fi
+  mkdir -p "$build/corpus/$name" "$build/findings/$name"
+  echo "== $name, $seconds s"
+  log="$build/findings/$name.log"
+  # shellcheck disable=SC2086  # inputs is a list of folders
+  if ! "$build/tests/fuzz/fuzz_$name" -max_total_time="$seconds" -timeout=30 -rss_limit_mb=3072 -max_len=65536 \
+      -dict="$here/tests/fuzz/json.dict" -artifact_prefix="$build/findings/$name/" -print_final_stats=1 \
+      "$build/corpus/$name" $inputs >"$log" 2>&1; then
+    tail -n 60 "$log"
+    input=$(ls -t "$build/findings/$name" | head -n 1)
+    echo "fuzz: $name broke a promise; repeat it with:"
+    echo "  $build/tests/fuzz/fuzz_$name $build/findings/$name/$input"
+    echo "Once it is repaired, put the input into tests/fuzz/corpus/$name, so that every build replays it."
+    exit 1
+  fi
+  grep -E "^stat::number_of_executed_units|^stat::peak_rss_mb" "$log"
+done <"$build/tests/fuzz/targets.txt"
+echo "fuzz: no promise was broken"
