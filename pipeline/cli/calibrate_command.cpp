@@ -53,7 +53,11 @@ void print_summary(const CalibrationSummary& summary, const Arguments& arguments
 
 nlohmann::ordered_json to_json(const CalibrationSummary& summary) {
   nlohmann::ordered_json pools = nlohmann::ordered_json::array();
+  std::int64_t judged = 0;
+  std::int64_t adapted = 0;
   for (const CalibratedPool& pool : summary.pools) {
+    judged += pool.judged;
+    adapted += pool.adapted;
     const filters::Calibration& result = pool.calibration;
     nlohmann::ordered_json curve = nlohmann::ordered_json::array();
     for (const filters::YieldPoint& point : pool.curve) {
@@ -72,7 +76,10 @@ nlohmann::ordered_json to_json(const CalibrationSummary& summary) {
     if (!pool.dataset.empty()) entry["dataset"] = pool.dataset;
     pools.push_back(std::move(entry));
   }
-  return {{"candidates", summary.candidates}, {"pools", std::move(pools)}};
+  return {{"candidates", summary.candidates},
+          {"judged", judged},
+          {"adapted", adapted},
+          {"pools", std::move(pools)}};
 }
 
 }  // namespace
