@@ -202,7 +202,8 @@ class LeftOut(unittest.TestCase):
                                     "species": {"horse": ["horse"], "wolf": ["wolf"]}}))
         out = self.scene.root / "curation"
         summary = json.loads(run("curate", "--config", rule, "--out", out, "--json").stdout)
-        self.assertEqual(summary["verdicts"]["train"], {"chosen": 6, "not_drawn": 5, "species_not_listed": 1})
+        self.assertEqual(summary["verdicts"]["train"], {"chosen": 6, "not_drawn": 5, "species_not_listed": 1,
+                                                        "species_unknown": 0})
         self.assertEqual(summary["chosen"], {"horse": {"test": 1, "train": 4}, "wolf": {"test": 1, "train": 2}})
         first = (out / "half.csv").read_bytes()
         run("curate", "--config", rule, "--out", out)
