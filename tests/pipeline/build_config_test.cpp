@@ -268,7 +268,8 @@ TEST(BuildConfig, TheShippedConfigsOfTheWorldAreSound) {
   const BuildConfig strict =
       load_build_config({configs / "world_stage2.json", configs / "world_strict.json"});
   EXPECT_EQ(strict.profile, "strict");
-  EXPECT_GT(strict.guards.held_out_share, 0.0);
+  EXPECT_EQ(strict.guards.held_out_share, 0.0);  // it shortens adaptation, which makes labels worse
+  EXPECT_GT(strict.guards.pose_deviation_max, 0.0);
   EXPECT_EQ(strict.guards.priors.parent_path(), std::filesystem::weakly_canonical(configs / "../data/loop"));
 }
 
@@ -382,7 +383,7 @@ TEST(Profiles, PaperIsTheRuleAloneAndTheDefault) {
   EXPECT_EQ(effective_config(parse_build_config(config, "t")), effective_config(paper));
 }
 
-TEST(Profiles, StrictTurnsEveryGuardOnAndTheConfigIsLaidOverIt) {
+TEST(Profiles, StrictBoundsLabelsAndTheConfigIsLaidOverIt) {
   json config = good();
   config["profile"] = "strict";
   config["guards"] = {{"visible_min", 3}, {"mask_iou_min", 0}};
@@ -392,8 +393,8 @@ TEST(Profiles, StrictTurnsEveryGuardOnAndTheConfigIsLaidOverIt) {
   EXPECT_EQ(strict.guards.mask_iou_min, 0.0);
   const json& layer = profile_layer("strict").at("guards");
   EXPECT_EQ(strict.guards.pose_deviation_max, layer.at("pose_deviation_max").get<double>());
-  for (const char* key : {"visible_min", "iterations_full_at", "held_out_share", "pose_deviation_max",
-                          "limb_factor_max", "left_right_max", "mask_iou_min"}) {
+  for (const char* key :
+       {"visible_min", "pose_deviation_max", "limb_factor_max", "left_right_max", "mask_iou_min"}) {
     EXPECT_GT(layer.at(key).get<double>(), 0.0) << key;
   }
 }
