@@ -240,8 +240,8 @@ std::string why(const ordered_json& verdict, const json& thresholds) {
       "L_proj of the prediction, {:.4f}, lies between tau_low = {:.4f} and tau_high = {:.4f}: it was "
       "adapted, {} "
       "iterations, and fell to {:.4f} at iteration {}.",
-      error, low, high, verdict.at("iterations").dump(), verdict.at("final_error").get<double>(),
-      verdict.at("best_iteration").dump());
+      error, low, high, std::llround(verdict.at("iterations").get<double>()),
+      verdict.at("final_error").get<double>(), std::llround(verdict.at("best_iteration").get<double>()));
   const double gain = verdict.at("gain").is_null() ? std::nan("") : verdict.at("gain").get<double>();
   const double delta = thresholds.at("delta").get<double>();
   if (text("reason") == "gain_too_small") {
