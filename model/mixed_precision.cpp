@@ -1,5 +1,6 @@
 #include "model/mixed_precision.h"
 
+#include <ATen/Version.h>
 #include <ATen/autocast_mode.h>
 
 namespace q3d::model {
@@ -17,6 +18,11 @@ MixedPrecision::~MixedPrecision() {
   if (at::autocast::decrement_nesting() == 0) at::autocast::clear_cache();
   at::autocast::set_autocast_enabled(kind_, was_enabled_);
   at::autocast::set_autocast_dtype(kind_, previous_dtype_);
+}
+
+bool bfloat16_is_slow(torch::Device device) {
+  const std::string vectors = at::get_cpu_capability();
+  return device.is_cpu() && (vectors == "AVX2" || vectors == "DEFAULT");
 }
 
 }  // namespace q3d::model

@@ -11,19 +11,26 @@ home=data/loop
 
 say() { printf '\n== %s\n' "$*" >&2; }
 
+# Two ranks on any machine, so that two cores are used and the bits do not depend on how many there are.
+train() {
+  OMP_NUM_THREADS=1 .venv/bin/torchrun --standalone --no-python --nproc-per-node 2 "$program" train "$@"
+}
+
 prepare() {
-  say "the rendered world"
+  say "the rendered world, and another one for pre-training"
   [ -f data/world/world.json ] || "$program" sample --out data/world
+  [ -f data/pretraining_world/world.json ] ||
+    "$program" sample --out data/pretraining_world --seed 100 --share 1.5
   say "training pools: every annotation packed into shards"
   local pool
-  for pool in animal3d ctrlani3d superanimal; do
+  for pool in animal3d ctrlani3d superanimal pretraining; do
     "$program" build --config "configs/world_pools/$pool.json" --out "$home/pools/$pool"
   done
   [ -f "$home/initial.safetensors" ] && [ -f "$home/priors.safetensors" ] ||
     "$program" init --size small --out "$home/initial.safetensors" --priors "$home/priors.safetensors" \
       --smal-asset data/world/assets/smal_synthetic.safetensors
   say "pre-training of the image encoders, shared by all stages"
-  "$program" train --config configs/world_training.json --stage pretrain --out "$home/pretrain"
+  train --config configs/world_training.json --stage pretrain --out "$home/pretrain"
 }
 
 # The training config's layers for a schedule and a seed; Stage 3 reads what this loop's Stage 2 made.
@@ -45,7 +52,7 @@ stage1() {
   mkdir -p "$run"
   say "Stage 1 ($schedule schedule, seed $seed)"
   # shellcheck disable=SC2046
-  "$program" train $(layers "$schedule" "$seed" "$run") --stage 1 --out "$run/stage1"
+  train $(layers "$schedule" "$seed" "$run") --stage 1 --out "$run/stage1"
 }
 
 evaluate() {
@@ -69,7 +76,7 @@ loop() {
     --truth data/world/truth/superanimal_quadruped_train.json --masks data/world --report "$run/labels"
   say "Stage 3: a fresh head on the same encoders, with the pseudo labels in place of the 2D annotations"
   # shellcheck disable=SC2046
-  "$program" train $(layers "$schedule" "$seed" "$run") --stage 3 --out "$run/stage3"
+  train $(layers "$schedule" "$seed" "$run") --stage 3 --out "$run/stage3"
   say "both networks on the test sets"
   evaluate "$run/stage1" "$run/evaluation1"
   evaluate "$run/stage3" "$run/evaluation3"

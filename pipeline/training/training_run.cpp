@@ -17,6 +17,7 @@
 #include "model/checkpoint.h"
 #include "model/device.h"
 #include "model/encoder_trainer.h"
+#include "model/mixed_precision.h"
 #include "model/module_state.h"
 #include "model/priors.h"
 #include "model/process_group.h"
@@ -226,6 +227,11 @@ class Run {
     manifests::remove_temporaries(options.out);
     if (options.quiet) return;
     if (!device_.warning.empty()) fmt::print(stderr, "warning: {}\n", device_.warning);
+    if (config.network.precision == "bfloat16" && model::bfloat16_is_slow(device_.device)) {
+      fmt::print(stderr,
+                 "warning: this processor has no AVX-512, without which convolutions in bfloat16 are about ten "
+                 "times slower than in float32; set network.precision to \"float32\"\n");
+    }
     fmt::print(stderr, "training on {}\n", device_.description);
     if (ranks_->size() > 1) {
       fmt::print(stderr, "{} ranks, each with {} of a batch's {} samples\n", ranks_->size(),
