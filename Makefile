@@ -47,7 +47,8 @@ bench: setup  ## build the benchmarks (bench/README.md says how to run them)
 asan:  ## all tests under the address and undefined-behaviour sanitizers
 	$(MAKE) test PRESET=asan
 
-fuzz:  ## fuzz every reader of files for FUZZ_SECONDS each (clang; tests/fuzz)
+fuzz: setup  ## fuzz every reader of files for FUZZ_SECONDS each (clang; tests/fuzz)
+	@command -v clang++ >/dev/null || { echo "make fuzz needs clang: apt-get install clang" >&2; exit 2; }
 	cmake --preset fuzz
 	cmake --build build/fuzz --parallel $(JOBS) --target fuzz_targets
 	tools/fuzz.sh build/fuzz $(FUZZ_SECONDS) $(FUZZ_TARGETS)

@@ -4,10 +4,12 @@
 #include <ATen/Parallel.h>
 #include <dlfcn.h>
 #include <fmt/format.h>
+#include <malloc.h>
 
 #include <array>
 #include <charconv>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <stdexcept>
 
@@ -101,11 +103,27 @@ DeviceChoice choose_device(const std::string& name, int local_rank) {
   return cuda_choice(*index);
 }
 
+namespace {
+
+// glibc gives large blocks back at once, and the system clears them anew for the next batch.
+void keep_freed_memory() {
+#ifdef __GLIBC__
+  constexpr int kLargestBlockBytes = 32 << 20;  // as much as glibc allows
+  constexpr int kMarginBytes = 64 << 20;
+  mallopt(M_MMAP_THRESHOLD, kLargestBlockBytes);
+  mallopt(M_TRIM_THRESHOLD, std::numeric_limits<int>::max());
+  mallopt(M_TOP_PAD, kMarginBytes);
+#endif
+}
+
+}  // namespace
+
 void configure_compute(int threads) {
   if (threads < 1) {
     throw std::invalid_argument(fmt::format("compute threads must be at least 1, got {}", threads));
   }
   at::set_num_threads(threads);
+  keep_freed_memory();
   at::Context& context = at::globalContext();
   // Operators without a deterministic form warn instead of failing, and fresh memory is not filled.
   context.setDeterministicAlgorithms(true, /*warn_only=*/true);

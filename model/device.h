@@ -19,7 +19,8 @@ struct DeviceChoice {
 // be used.
 DeviceChoice choose_device(const std::string& name, int local_rank = 0);
 
-// Reproducible kernels, and the number of threads a CPU operator may use.
+// Reproducible kernels, the number of threads a CPU operator may use, and memory that stays with the process
+// instead of going back to the system between two batches.
 void configure_compute(int threads);
 
 }  // namespace q3d::model

@@ -64,6 +64,8 @@ DatasetConfig parse_dataset(const json& object, const std::string& where) {
   std::string images;
   std::string role(to_string(options.role));
   std::string curation;
+  std::string body_model;
+  std::string keypoints_3d = "file";
   JsonFields fields(object, where);
   fields.require("name", options.name);
   fields.require("format", options.format);
@@ -74,6 +76,8 @@ DatasetConfig parse_dataset(const json& object, const std::string& where) {
   fields.read("images", images);
   fields.read("role", role);
   fields.read("curation", curation);
+  fields.read("body_model", body_model);
+  fields.read("keypoints_3d", keypoints_3d);
   read_label_options(fields, options);
   fields.finish();
   require_one_of(options.format, loaders::dataset_formats(), where + ": format");
@@ -84,6 +88,13 @@ DatasetConfig parse_dataset(const json& object, const std::string& where) {
   require(options.role != Role::truth || options.format == "prima", where,
           "\"role\": \"truth\" needs a format that gives bodies, which is \"prima\"; got \"" +
               options.format + "\". For keypoints alone use \"2d_only\"");
+  require_one_of(keypoints_3d, {"file", "body"}, where + ": keypoints_3d");
+  require(body_model.empty() || options.role == Role::truth, where,
+          "\"body_model\" checks the bodies that a file gives, so it needs \"role\": \"truth\"");
+  require(keypoints_3d == "file" || !body_model.empty(), where,
+          "\"keypoints_3d\": \"body\" needs a \"body_model\" to compute them");
+  options.body_model = body_model;
+  options.keypoints_3d_of_body = keypoints_3d == "body";
   options.root = root;
   options.annotations = annotations;
   options.images = images;
@@ -105,7 +116,8 @@ std::vector<DatasetConfig> parse_datasets(const json& list, const std::string& w
 void resolve_dataset_paths(json& object, const char* key, const fs::path& folder) {
   if (!object.is_object() || !object.contains(key) || !object[key].is_array()) return;
   for (json& dataset : object[key]) {
-    for (const char* path : {"root", "topology", "curation"}) resolve_path(dataset, path, folder);
+    for (const char* path : {"root", "topology", "curation", "body_model"})
+      resolve_path(dataset, path, folder);
   }
 }
 

@@ -22,6 +22,9 @@ namespace q3d::pipeline {
 struct DatasetConfig : loaders::DatasetOptions {
   Role role = Role::pseudo;
   std::filesystem::path curation{};  // list of `curate` that names the pictures to take; empty takes all
+  std::filesystem::path
+      body_model{};  // checks the file's 3D keypoints (pipeline/body_check.h); empty does not
+  bool keypoints_3d_of_body = false;  // labels get the body's instead of the file's
 };
 
 struct NetworkConfig {

@@ -11,6 +11,10 @@ ordered_json dataset_json(const DatasetConfig& dataset) {
                          {"split", dataset.split},        {"role", to_string(dataset.role)}};
   if (!dataset.images.empty()) object["images"] = dataset.images.string();
   if (!dataset.curation.empty()) object["curation"] = dataset.curation.string();
+  if (!dataset.body_model.empty()) {
+    object["body_model"] = dataset.body_model.string();
+    object["keypoints_3d"] = dataset.keypoints_3d_of_body ? "body" : "file";
+  }
   if (dataset.topology.empty()) return object;
   object["topology"] = dataset.topology.string();
   object["species"] = dataset.species;

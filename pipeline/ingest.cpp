@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "manifests/record_json.h"
+#include "pipeline/body_check.h"
 #include "pipeline/configured_dataset.h"
 #include "pipeline/interrupt.h"
 
@@ -52,7 +53,7 @@ void check_role(Role role, manifests::SampleRecord& record) {
       "pose: got nothing, or zeros throughout; expected 35 rotations, since the dataset's role is \"truth\"";
 }
 
-// A picture that cannot be read now is a failed sample, never a failed build.
+// A picture that cannot be read now is a failed sample, never a failed build; a mask is then none.
 void digest_pictures(std::vector<Candidate>& candidates, manifests::DigestCache& digests) {
   tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t i) {
     Candidate& candidate = candidates[i];
@@ -62,6 +63,11 @@ void digest_pictures(std::vector<Candidate>& candidates, manifests::DigestCache&
     } catch (const std::runtime_error&) {
       candidate.record.failure = Reason::image_missing;
       candidate.record.failure_detail = candidate.record.image_ref + " cannot be read";
+    }
+    if (candidate.record.mask_path.empty()) return;
+    try {
+      candidate.mask_sha256 = digests.digest(candidate.record.mask_path);
+    } catch (const std::runtime_error&) {  // decoding tells
     }
   });
   throw_if_interrupted();
@@ -76,14 +82,25 @@ std::vector<Unit> cut_units(const std::vector<Candidate>& candidates, std::size_
     unit.count = std::min(unit_size, candidates.size() - first);
     std::string text;
     for (std::size_t i = first; i < first + unit.count; ++i) {
-      text += manifests::record_digest(candidates[i].record) + ' ' + candidates[i].image_sha256 + ' ';
+      text += manifests::record_digest(candidates[i].record) + ' ' + candidates[i].image_sha256 + ' ' +
+              candidates[i].mask_sha256 + ' ';
       text += std::string(to_string(candidates[i].role)) + '\n';
+      if (!candidates[i].finding.empty()) text += candidates[i].finding + '\n';
     }
     unit.input_digest = manifests::sha256(text);
     unit.label_digest = unit.input_digest;
     units.push_back(std::move(unit));
   }
   return units;
+}
+
+// Findings of all records; none without a body model.
+std::vector<std::string> check_truth(const DatasetConfig& options, loaders::Dataset& dataset) {
+  if (options.body_model.empty()) return std::vector<std::string>(dataset.records.size());
+  const BodyMeshes bodies(options.body_model);
+  BodyCheck check = check_bodies(bodies, options.keypoints_3d_of_body, dataset.records);
+  dataset.notes.push_back(to_note(check));
+  return std::move(check.findings);
 }
 
 }  // namespace
@@ -104,9 +121,11 @@ Ingest ingest(const BuildConfig& config, manifests::DigestCache& digests) {
     auto [dataset, digest] = read_dataset(options, digests);
     const std::string name = options.name + "/" + options.split;
     result.annotation_digests[name] = std::move(digest);
-    for (auto& record : dataset.records) {
-      check_role(options.role, record);
-      result.candidates.push_back({std::move(record), {}, options.role});
+    for (auto& record : dataset.records) check_role(options.role, record);
+    std::vector<std::string> findings = check_truth(options, dataset);
+    for (std::size_t i = 0; i < dataset.records.size(); ++i) {
+      result.candidates.push_back(
+          {std::move(dataset.records[i]), {}, {}, options.role, std::move(findings[i])});
     }
     for (const auto& note : dataset.notes) result.notes.push_back(name + ": " + note);
   }

@@ -24,7 +24,9 @@ struct Exclusion {
 struct Candidate {
   manifests::SampleRecord record;
   std::string image_sha256;  // empty when the picture could not be read
+  std::string mask_sha256;   // empty when there is none, or it could not be read
   Role role = Role::pseudo;  // its dataset's
+  std::string finding;       // of the check of its body, for people; empty where there is nothing to tell
   Exclusion exclusion{};
 };
 
@@ -33,7 +35,7 @@ struct Unit {
   std::int64_t index = 0;
   std::size_t first = 0;  // into Ingest::candidates
   std::size_t count = 0;
-  std::string input_digest;  // over the records, pictures and roles of the unit
+  std::string input_digest;  // over the records, pictures, masks and roles of the unit
   std::string
       label_digest;  // the same, and over what is left out: predictions do not depend on it, shards do
 };

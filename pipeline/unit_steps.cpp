@@ -114,8 +114,9 @@ void take_annotated_body(const Candidate& candidate, PredictedSample& sample) {
   sample.body = no_body();
   if (candidate.role != Role::truth) return;
   sample.body = annotated_body(*candidate.record.truth);
-  const std::string missing = missing_parts(*candidate.record.truth);
-  if (!missing.empty()) sample.detail += (sample.detail.empty() ? "" : "; ") + missing;
+  for (const std::string& told : {missing_parts(*candidate.record.truth), candidate.finding}) {
+    if (!told.empty()) sample.detail += (sample.detail.empty() ? "" : "; ") + told;
+  }
 }
 
 }  // namespace

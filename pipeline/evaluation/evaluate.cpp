@@ -9,9 +9,9 @@
 #include <thread>
 
 #include "manifests/digest.h"
-#include "pipeline/configured_dataset.h"
 #include "pipeline/evaluation/dataset_evaluator.h"
 #include "pipeline/evaluation/hidden_truth.h"
+#include "pipeline/ingest.h"
 #include "pipeline/interrupt.h"
 
 namespace q3d::pipeline::evaluation {
@@ -34,12 +34,12 @@ std::vector<SampleRecord> evenly_spaced(std::vector<SampleRecord> records, std::
 }
 
 LoadedDataset load(const EvaluatedDataset& dataset, std::int64_t limit) {
-  throw_if_interrupted();
   const DatasetConfig& source = dataset.source;
   LoadedDataset loaded;
-  loaders::Dataset read = load_configured(source);
+  manifests::DigestCache digests{{}};  // remembers nothing: an evaluation leaves no files but its own
+  auto [read, annotations_sha256] = read_dataset(source, digests);
   loaded.result.name = source.name + "/" + source.split;
-  loaded.result.annotations_sha256 = manifests::sha256_file(source.root / source.annotations);
+  loaded.result.annotations_sha256 = std::move(annotations_sha256);
   loaded.result.notes = std::move(read.notes);
   loaded.result.listed = static_cast<std::int64_t>(read.records.size());
   if (!dataset.truth.empty()) {

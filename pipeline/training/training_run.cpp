@@ -228,9 +228,10 @@ class Run {
     if (options.quiet) return;
     if (!device_.warning.empty()) fmt::print(stderr, "warning: {}\n", device_.warning);
     if (config.network.precision == "bfloat16" && model::bfloat16_is_slow(device_.device)) {
-      fmt::print(stderr,
-                 "warning: this processor has no AVX-512, without which convolutions in bfloat16 are about ten "
-                 "times slower than in float32; set network.precision to \"float32\"\n");
+      fmt::print(
+          stderr,
+          "warning: this processor has no AVX-512, without which convolutions in bfloat16 are about ten "
+          "times slower than in float32; set network.precision to \"float32\"\n");
     }
     fmt::print(stderr, "training on {}\n", device_.description);
     if (ranks_->size() > 1) {

@@ -87,6 +87,13 @@ TEST(BuildConfig, ReadsLabelsOfOnesOwn) {
 TEST(BuildConfig, ReadsWhatIsToBeLeftOut) {
   json document = good();
   EXPECT_FALSE(parse_build_config(document, "t").leakage);
+  document["datasets"].push_back({{"name", "truth"},
+                                  {"format", "prima"},
+                                  {"root", "r"},
+                                  {"annotations", "t"},
+                                  {"role", "truth"},
+                                  {"body_model", "smal.safetensors"},
+                                  {"keypoints_3d", "body"}});
   document["veto"] = "list.txt";
   document["leakage"] = {{"test_sets", document["datasets"]}, {"max_distance", 3}};
   const BuildConfig config = parse_build_config(document, "t");
@@ -109,6 +116,8 @@ TEST(BuildConfig, EveryPathIsRelativeToItsFile) {
   EXPECT_EQ(config.veto, scratch.path() / "list.txt");
   EXPECT_EQ(config.datasets[0].topology, scratch.path() / "goats.json");
   EXPECT_EQ(config.datasets[0].curation, scratch.path() / "chosen.csv");
+  EXPECT_EQ(config.datasets.back().body_model, scratch.path() / "smal.safetensors");
+  EXPECT_TRUE(config.datasets.back().keypoints_3d_of_body);
   EXPECT_EQ(config.leakage->test_sets[0].root, scratch.path() / "r");
   EXPECT_EQ(config.as_written["veto"], "list.txt");
 }
@@ -176,6 +185,9 @@ INSTANTIATE_TEST_SUITE_P(
         Mutation{"/version", "\"1.0.x\"", "must look like 1.0.0"},
         Mutation{"/datasets", "[]", "at least one dataset"}, Mutation{"/datasets", "{}", "must be a list"},
         Mutation{"/datasets/0/format", "\"prma\"", "Did you mean \"prima\"?"},
+        Mutation{"/datasets/0/body_model", "\"smal.safetensors\"", "needs \"role\": \"truth\""},
+        Mutation{"/datasets/0/keypoints_3d", "\"body\"", "needs a \"body_model\""},
+        Mutation{"/datasets/0/keypoints_3d", "\"bdy\"", "file, body"},
         Mutation{"/datasets/0/rot", "\"x\"", "did you mean \"root\"?"},
         Mutation{"/datasets/0/name", "\"../x\"", "letters, digits"},
         Mutation{"/datasets/0/role", "\"truht\"", "Did you mean \"truth\"?"},
