@@ -61,6 +61,7 @@ Augmentation draw_augmentation(const AugmentOptions& options, std::mt19937_64& e
   if (uniform(engine) < options.rotation_rate)
     drawn.rotation_deg = cut_normal(engine, 2.0) * options.rotation_deg;
   for (double& channel : drawn.colour) channel = 1.0 + (2.0 * uniform(engine) - 1.0) * options.colour;
+  if (options.mirror_rate > 0.0) drawn.mirror = uniform(engine) < options.mirror_rate;
   return drawn;
 }
 
@@ -68,7 +69,10 @@ Affine augmented_patch_from_image(const SquareBox& box, const Augmentation& augm
   SquareBox shifted = box;
   shifted.center_x_px += box.side_px * augmentation.shift_x;
   shifted.center_y_px += box.side_px * augmentation.shift_y;
-  return patch_from_image(shifted, kPatchSidePx, augmentation.scale, augmentation.rotation_deg);
+  const Affine upright =
+      patch_from_image(shifted, kPatchSidePx, augmentation.scale, augmentation.rotation_deg);
+  constexpr Affine kTurnedOver{-1.0, 0.0, kPatchSidePx, 0.0, 1.0, 0.0};
+  return augmentation.mirror ? compose(kTurnedOver, upright) : upright;
 }
 
 std::array<float, manifests::kNumKeypoints * 3> rotate_keypoints_3d(

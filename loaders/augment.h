@@ -1,7 +1,8 @@
 // Training augmentation: what is drawn, and what it does to boxes, 3D keypoints and the global orientation.
 //
 // Official code: do_augmentation and get_example. Its mirror flip and its extreme crop crash there and are
-// off in every released configuration; neither is offered here.
+// off in every released configuration. The extreme crop is not offered here; the mirror is our own
+// (loaders/mirror.h) and off by default.
 #pragma once
 
 #include <array>
@@ -18,6 +19,7 @@ struct AugmentOptions {        // the official configuration's values
   double rotation_rate = 0.6;  // share of samples that are rotated
   double shift = 0.02;         // of the box side, each axis
   double colour = 0.2;         // each channel times 1 +- this
+  double mirror_rate = 0.0;    // share of samples that are turned over, left for right
 };
 
 struct Augmentation {
@@ -26,13 +28,15 @@ struct Augmentation {
   double shift_x = 0.0;       // of the unscaled box side
   double shift_y = 0.0;
   std::array<double, 3> colour{1.0, 1.0, 1.0};  // R, G, B; for normalise_patch
+  bool mirror = false;                          // of the patch, after all else
 };
 
 // The official distributions: normal numbers cut at +-1 for shift and scale, at +-2 for rotation, uniform
 // colour. The sequence depends on the engine's state alone, not on the standard library's distributions.
 Augmentation draw_augmentation(const AugmentOptions& options, std::mt19937_64& engine);
 
-// Image px -> patch px under an augmentation; feed it to warp_patch and keypoints_to_crop.
+// Image px -> patch px under an augmentation; feed it to warp_patch and keypoints_to_crop. A mirrored patch
+// is turned over about the crop camera's principal point, px 128.
 Affine augmented_patch_from_image(const SquareBox& box, const Augmentation& augmentation);
 
 // Turns 3D keypoints (x, y, z) by -rotation_deg about the camera's z axis, in float32.

@@ -12,6 +12,7 @@
 #include <stdexcept>
 
 #include "loaders/encode.h"
+#include "loaders/mirror.h"
 #include "loaders/stored_crop.h"
 
 namespace q3d::pipeline {
@@ -61,27 +62,36 @@ void turn_orientation(std::span<float> rotation, double rotation_deg) {
 }
 
 void fill_keypoints_2d(const TrainingSample& sample, const loaders::Affine& patch_from_image,
-                       KeypointWeight weight, std::span<float> out) {
+                       KeypointWeight weight, bool mirror, std::span<float> out) {
   const auto keypoints = loaders::keypoints_to_crop(sample.keypoints, patch_from_image);
   std::copy(keypoints.begin(), keypoints.end(), out.begin());
-  if (weight == KeypointWeight::label) return;
-  // A v below 0 would reward errors.
-  for (std::size_t i = 0; i < kKeypoints; ++i) out[3 * i + 2] = std::max(0.0F, sample.keypoints[i].v);
+  if (weight == KeypointWeight::raw_v) {  // a v below 0 would reward errors
+    for (std::size_t i = 0; i < kKeypoints; ++i) out[3 * i + 2] = std::max(0.0F, sample.keypoints[i].v);
+  }
+  if (mirror) loaders::swap_keypoint_sides(out, 3);
 }
 
-void fill_body(const TrainingSample& sample, double rotation_deg, FeedBatch& batch, std::int64_t slot) {
-  const auto at = static_cast<std::size_t>(slot);
-  const auto keypoints = loaders::rotate_keypoints_3d(sample.keypoints_3d, rotation_deg);
-  const std::span<float> out = row(batch.keypoints_3d, slot, kKeypoints * 4);
+void fill_keypoints_3d(const TrainingSample& sample, const loaders::Augmentation& augmentation,
+                       std::span<float> out) {
+  const auto keypoints = loaders::rotate_keypoints_3d(sample.keypoints_3d, augmentation.rotation_deg);
   for (std::size_t i = 0; sample.has_keypoints_3d && i < kKeypoints; ++i) {
     std::copy_n(keypoints.begin() + static_cast<std::ptrdiff_t>(3 * i), 3,
                 out.begin() + static_cast<std::ptrdiff_t>(4 * i));
+    if (augmentation.mirror) out[4 * i] = -out[4 * i];
     out[4 * i + 3] = 1.0F;
   }
+  if (augmentation.mirror) loaders::swap_keypoint_sides(out, 4);
+}
+
+void fill_body(const TrainingSample& sample, const loaders::Augmentation& augmentation, FeedBatch& batch,
+               std::int64_t slot) {
+  const auto at = static_cast<std::size_t>(slot);
+  fill_keypoints_3d(sample, augmentation, row(batch.keypoints_3d, slot, kKeypoints * 4));
   const std::span<float> rotations = row(batch.rotations, slot, kRotationNumbers);
   if (sample.has_pose) {
     std::copy(sample.pose.begin(), sample.pose.end(), rotations.begin());
-    turn_orientation(rotations.first(9), rotation_deg);
+    turn_orientation(rotations.first(9), augmentation.rotation_deg);
+    if (augmentation.mirror) loaders::mirror_pose(rotations);
   } else {
     for (std::size_t i = 0; i < kRotationNumbers; i += 9) {
       rotations[i] = rotations[i + 4] = rotations[i + 8] = 1.0F;
@@ -169,9 +179,9 @@ void Feed::fill(FeedBatch& batch, std::int64_t slot) const {
   loaders::normalise_patch(
       patch.rgb, augmentation.colour,
       {batch.images.get() + static_cast<std::size_t>(slot) * kImageNumbers, kImageNumbers});
-  fill_keypoints_2d(sample, patch_from_image, options_.keypoint_weight,
+  fill_keypoints_2d(sample, patch_from_image, options_.keypoint_weight, augmentation.mirror,
                     row(batch.keypoints_2d, slot, kKeypoints * 3));
-  fill_body(sample, augmentation.rotation_deg, batch, slot);
+  fill_body(sample, augmentation, batch, slot);
   batch.species[static_cast<std::size_t>(slot)] = number_of(sample.species, species_);
 }
 

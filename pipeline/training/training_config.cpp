@@ -122,12 +122,14 @@ void parse_augmentation(const json& object, const std::string& where, loaders::A
   fields.read("scale", options.scale);
   fields.read("rotation_deg", options.rotation_deg);
   fields.read("rotation_rate", options.rotation_rate);
+  fields.read("mirror_rate", options.mirror_rate);
   fields.read("shift", options.shift);
   fields.read("colour", options.colour);
   fields.finish();
   require(options.scale >= 0.0 && options.scale < 1.0, where, "\"scale\" must be 0 to less than 1");
   require(options.rotation_rate >= 0.0 && options.rotation_rate <= 1.0, where,
           "\"rotation_rate\" must be 0 to 1");
+  require(options.mirror_rate >= 0.0 && options.mirror_rate <= 1.0, where, "\"mirror_rate\" must be 0 to 1");
   require(options.rotation_deg >= 0.0 && options.rotation_deg <= 90.0, where,
           "\"rotation_deg\" must be 0 to 90");
   require(options.shift >= 0.0 && options.shift < 1.0, where, "\"shift\" must be 0 to less than 1");

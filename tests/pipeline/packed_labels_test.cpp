@@ -7,6 +7,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "loaders/topology.h"
 #include "manifests/atomic_file.h"
 #include "manifests/shard.h"
 #include "pipeline/build.h"
@@ -72,12 +73,17 @@ class PackedLabels : public ::testing::Test {
         pool.samples.emplace(std::move(id), std::move(sample));
       }
     }
-    std::vector<ShardPool> pools;
-    pools.emplace_back(set, std::vector<fs::path>{pool.summary.folder});
-    const Feed feed(std::move(pools), {1.0}, {.batch = kDraws, .augment = false}, 11);
+    const Feed feed = feed_of(pool, {.batch = kDraws, .augment = false});
     pool.batch = feed.batch(0);
     for (const std::string& id : feed.ids(0)) pool.drawn.push_back(&pool.samples.at(id));
     return pool;
+  }
+
+  // Options do not change which samples are drawn.
+  static Feed feed_of(const Pool& pool, const FeedOptions& options) {
+    std::vector<ShardPool> pools;
+    pools.emplace_back("pool", std::vector<fs::path>{pool.summary.folder});
+    return {std::move(pools), {1.0}, options, 11};
   }
 
   static fs::path* folder_;
@@ -122,19 +128,25 @@ void expect_families(const Pool& pool, const fs::path& annotations) {
   }
 }
 
-// The truth's batch against the body model: pose and shape give the 3D keypoints.
-void expect_smal_keypoints(const Pool& pool, const fs::path& asset) {
+torch::Tensor tensor_of(const std::vector<float>& values, std::vector<std::int64_t> shape) {
+  return torch::tensor(values).view(shape);
+}
+
+// How far the batch's 3D keypoints are from those that its pose and shape give.
+double distance_from_body(const FeedBatch& batch, const fs::path& asset) {
   const smal::SmalBody body(smal::load_asset(asset));
   const torch::InferenceMode no_gradients;
-  const auto tensor = [](const std::vector<float>& values, std::vector<std::int64_t> shape) {
-    return torch::tensor(values).view(shape);
-  };
-  const torch::Tensor rotations = tensor(pool.batch.rotations, {kDraws, manifests::kNumJoints, 3, 3});
-  const torch::Tensor betas = tensor(pool.batch.betas, {kDraws, manifests::kNumBetas});
-  const torch::Tensor expected = body.keypoints(rotations, betas);
-  const torch::Tensor stored = tensor(pool.batch.keypoints_3d, {kDraws, manifests::kNumKeypoints, 4});
-  const torch::Tensor difference = (stored.narrow(2, 0, 3) - expected).abs();
-  EXPECT_LT(difference.max().item<double>(), 1e-4);
+  const torch::Tensor rotations = tensor_of(batch.rotations, {kDraws, manifests::kNumJoints, 3, 3});
+  const torch::Tensor expected =
+      body.keypoints(rotations, tensor_of(batch.betas, {kDraws, manifests::kNumBetas}));
+  const torch::Tensor stored = tensor_of(batch.keypoints_3d, {kDraws, manifests::kNumKeypoints, 4});
+  return (stored.narrow(2, 0, 3) - expected).abs().max().item<double>();
+}
+
+// The truth's batch against the body model: pose and shape give the 3D keypoints.
+void expect_smal_keypoints(const Pool& pool, const fs::path& asset) {
+  EXPECT_LT(distance_from_body(pool.batch, asset), 1e-4);
+  const torch::Tensor rotations = tensor_of(pool.batch.rotations, {kDraws, manifests::kNumJoints, 3, 3});
   for (std::size_t slot = 0; slot < pool.drawn.size(); ++slot) {
     EXPECT_EQ(pool.batch.has_pose[slot], 1.0F);
     EXPECT_EQ(pool.batch.has_betas[slot], 1.0F);
@@ -167,6 +179,39 @@ TEST_F(PackedLabels, Animal3dProjectsOntoItsLabelsWithinTheirNoise) {
   EXPECT_GT(all[all.size() / 2], 0.002);
   expect_smal_keypoints(pool, *folder_ / "world/assets/smal_synthetic.safetensors");
   expect_families(pool, *folder_ / "world/animal3d/train.json");
+}
+
+// Of rows of `width` numbers, the first negated and sides exchanged: the largest difference.
+double distance_from_mirror(const std::vector<float>& plain, const std::vector<float>& mirrored,
+                            std::int64_t width) {
+  const std::vector<int> flip = loaders::topology("animal3d26").flip;
+  const torch::Tensor order = torch::tensor(std::vector<std::int64_t>(flip.begin(), flip.end()));
+  torch::Tensor expected = tensor_of(plain, {kDraws, manifests::kNumKeypoints, width}).index_select(1, order);
+  expected.select(2, 0).neg_();
+  return (tensor_of(mirrored, {kDraws, manifests::kNumKeypoints, width}) - expected)
+      .abs()
+      .max()
+      .item<double>();
+}
+
+TEST_F(PackedLabels, AMirroredSampleIsTheMirroredBodyInTheMirroredPicture) {
+  const Pool pool = packed("control_animal3dlatest", "prima", "train.json", "truth");
+  loaders::AugmentOptions turned_over;
+  turned_over.scale = turned_over.shift = turned_over.colour = turned_over.rotation_rate = 0.0;
+  turned_over.mirror_rate = 1.0;
+  const FeedBatch mirrored = feed_of(pool, {.batch = kDraws, .augmentation = turned_over}).batch(0);
+  EXPECT_LT(distance_from_mirror(pool.batch.keypoints_2d, mirrored.keypoints_2d, 3), 1e-5);
+  EXPECT_LT(distance_from_mirror(pool.batch.keypoints_3d, mirrored.keypoints_3d, 4), 1e-6);
+  EXPECT_LT(distance_from_body(mirrored, *folder_ / "world/assets/smal_synthetic.safetensors"), 1e-3);
+  EXPECT_EQ(mirrored.betas, pool.batch.betas);
+  // Column x of one is column 256 - x of the other.
+  const auto picture = [](const FeedBatch& batch) {
+    return torch::from_blob(batch.images.get(), {kDraws, 3, 256, 256}).clone();
+  };
+  const torch::Tensor expected = picture(pool.batch).flip(3).narrow(3, 0, 255);
+  const torch::Tensor difference = (picture(mirrored).narrow(3, 1, 255) - expected).abs();
+  EXPECT_LT(difference.mean().item<double>(), 0.01);
+  EXPECT_GT((picture(mirrored) - picture(pool.batch)).abs().mean().item<double>(), 0.1);
 }
 
 TEST_F(PackedLabels, SuperAnimalIsKeypointsAlone) {
