@@ -33,16 +33,17 @@ prepare() {
   train --config configs/world_training.json --stage pretrain --out "$home/pretrain"
 }
 
-# The training config's layers for a schedule and a seed; Stage 3 reads what this loop's Stage 2 made.
+# The training config's layers for a schedule and a seed; Stage 3 reads what this loop's Stage 2 made, with the weight
+# of CtrlAni3D: a pseudo label is a 3D label.
 layers() {
   local schedule=$1 seed=$2 run=$3
   cat >"$run/run.json" <<JSON
 { "network": { "encoders": "../pretrain/model.safetensors" },
-  "pools": { "quadruped3d": { "shards": ["stage2/latest"], "weight": 0.15 } },
+  "pools": { "quadruped3d": { "shards": ["stage2/latest"], "weight": 0.5 } },
   "model_dtype": "float16",
   "seed": $seed }
 JSON
-  printf -- '--config configs/world_training.json '
+  printf -- '--config configs/world_training.json --config configs/world_training_heads.json '
   [ "$schedule" = full ] || printf -- '--config configs/world_training_%s.json ' "$schedule"
   printf -- '--config %s/run.json' "$run"
 }
