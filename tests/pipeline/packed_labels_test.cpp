@@ -132,7 +132,8 @@ torch::Tensor tensor_of(const std::vector<float>& values, std::vector<std::int64
   return torch::tensor(values).view(shape);
 }
 
-// How far the batch's 3D keypoints are from those that its pose and shape give.
+// How far the batch's 3D keypoints are from those that its pose and shape give; relative to keypoint 0, as
+// the loss sees them, since a body turns about its root and not about the origin.
 double distance_from_body(const FeedBatch& batch, const fs::path& asset) {
   const smal::SmalBody body(smal::load_asset(asset));
   const torch::InferenceMode no_gradients;
@@ -140,7 +141,8 @@ double distance_from_body(const FeedBatch& batch, const fs::path& asset) {
   const torch::Tensor expected =
       body.keypoints(rotations, tensor_of(batch.betas, {kDraws, manifests::kNumBetas}));
   const torch::Tensor stored = tensor_of(batch.keypoints_3d, {kDraws, manifests::kNumKeypoints, 4});
-  return (stored.narrow(2, 0, 3) - expected).abs().max().item<double>();
+  const auto relative = [](const torch::Tensor& points) { return points - points.narrow(1, 0, 1); };
+  return (relative(stored.narrow(2, 0, 3)) - relative(expected)).abs().max().item<double>();
 }
 
 // The truth's batch against the body model: pose and shape give the 3D keypoints.
