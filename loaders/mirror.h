@@ -15,8 +15,9 @@ namespace q3d::loaders {
 void swap_keypoint_sides(std::span<float> rows, std::size_t width);
 
 // The pose of the mirrored body, mirrored about the camera's plane x = 0, so that its keypoints are those of
-// the pose given with x negated and sides exchanged. rotations: 35 x 3 x 3, row-major, joint 0 is the global
-// orientation. Throws std::invalid_argument on another size.
+// the pose given with x negated and sides exchanged, up to a translation, since a body turns about its root.
+// rotations: 35 x 3 x 3, row-major, joint 0 is the global orientation. Throws std::invalid_argument on
+// another size.
 void mirror_pose(std::span<float> rotations);
 
 }  // namespace q3d::loaders

@@ -11,9 +11,14 @@ home=data/loop
 
 say() { printf '\n== %s\n' "$*" >&2; }
 
-# Two ranks on any machine, so that two cores are used and the bits do not depend on how many there are.
+# Two ranks on any machine, so that two cores are used and the bits do not depend on how many there are. RANKS=1 is
+# for running several trainings side by side.
 train() {
-  OMP_NUM_THREADS=1 .venv/bin/torchrun --standalone --no-python --nproc-per-node 2 "$program" train "$@"
+  if [ "${RANKS:-2}" = 1 ]; then
+    "$program" train "$@" --threads 1
+  else
+    OMP_NUM_THREADS=1 .venv/bin/torchrun --standalone --no-python --nproc-per-node "${RANKS:-2}" "$program" train "$@"
+  fi
 }
 
 prepare() {
