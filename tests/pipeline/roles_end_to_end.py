@@ -156,6 +156,60 @@ class Roles(unittest.TestCase):
         self.assertEqual(details[3], "")
         run("verify", self.root / "lacks")
 
+    def test_keypoints_that_are_not_the_bodys_are_told_and_can_be_replaced(self):
+        # The drawn 3D keypoints are random, so no body has them; one record has none.
+        records = [dict(record) for record in self.records[:3]]
+        del records[2]["keypoint_3d"]
+        shutil.copytree(self.root / "data", self.root / "checked")
+        write_annotations(self.root / "checked", records)
+        body = self.root / "smal.safetensors"
+        run("init", "--size", "tiny", "--out", self.root / "net.safetensors", "--smal-asset", body)
+        config = json.loads(self.config("truth", "checked", "checked").read_text())
+        config["datasets"][0]["body_model"] = str(body)
+        (self.root / "checked.json").write_text(json.dumps(config))
+        told = run("build", "--config", self.root / "checked.json", "--out", self.root / "told").stderr
+        self.assertIn("0 of 2 agree within 1 mm", told)
+        self.assertIn("1 records had none", told)
+        rows = self.verdicts("told")
+        for row, words in zip(rows, ("mm from that of the file's own body", "mm from", "computed from its body")):
+            self.assertIn(words, row["detail"])
+        samples = self.rows(self.latest("told"))
+        np.testing.assert_array_equal(samples[0]["keypoints_3d"], np.float32(records[0]["keypoint_3d"]))
+        self.assertEqual(samples[2]["has_keypoints_3d"], 1)
+        config["datasets"][0]["keypoints_3d"] = "body"
+        (self.root / "checked.json").write_text(json.dumps(config))
+        self.build("told", self.root / "checked.json")
+        taken = self.rows(self.latest("told"))
+        self.assertTrue(np.abs(taken[0]["keypoints_3d"] - samples[0]["keypoints_3d"]).max() > 0.01)
+        np.testing.assert_array_equal(taken[2]["keypoints_3d"], samples[2]["keypoints_3d"])
+        run("verify", self.root / "told")
+
+    def test_a_changed_mask_makes_its_unit_anew(self):
+        data = self.root / "masked"
+        shutil.copytree(self.root / "data", data)
+        records = [dict(record, mask_path=f"mask{i}.png") for i, record in enumerate(self.records[:2 * UNIT])]
+        write_annotations(data, records)
+
+        def draw_mask(i, right):
+            with Image.open(data / records[i]["img_path"]) as picture:
+                mask = np.zeros((picture.height, picture.width), np.uint8)
+            mask[20:90, 20:right] = 255
+            Image.fromarray(mask).save(data / f"mask{i}.png")
+
+        def content():
+            self.build("masks", self.config("truth", "masked", "masked"))
+            return {path.name: hashlib.sha256(path.read_bytes()).hexdigest()
+                    for path in sorted((self.latest("masks") / "shards").glob("*.h5"))}
+
+        for i in range(len(records)):
+            draw_mask(i, 100)
+        before = content()
+        draw_mask(UNIT + 1, 120)
+        after = content()
+        self.assertEqual([name for name in before if before[name] != after[name]], ["000001.h5"])
+        draw_mask(UNIT + 1, 100)
+        self.assertEqual(content(), before)
+
     def test_bad_samples_are_counted_with_their_reasons(self):
         data = self.root / "bad"
         shutil.copytree(self.root / "data", data)
