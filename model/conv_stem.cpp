@@ -8,7 +8,6 @@ namespace {
 
 constexpr double kNormEpsilon = 1e-5;
 constexpr std::int64_t kChannelsPerGroup = 16;
-constexpr std::size_t kReducingUnits = 4;  // the others add to what they are given
 
 }  // namespace
 
@@ -23,13 +22,12 @@ class ConvUnit : public torch::nn::Module {
     norm_bias_ = norm->register_parameter("bias", torch::empty({out}, placement.vector()));
   }
 
-  // Before the activation.
-  torch::Tensor normalised(const torch::Tensor& x) const {
+  torch::Tensor forward(const torch::Tensor& x) const {
     const torch::Tensor maps =
         torch::conv2d(x.to(weight_.scalar_type()), weight_, {}, stride_, /*padding=*/side_ / 2);
     // Only the CPU's group norm takes reduced maps beside float32 weights.
     const torch::Tensor in = maps.is_cpu() ? maps : maps.to(norm_weight_.scalar_type());
-    return torch::group_norm(in, groups_, norm_weight_, norm_bias_, kNormEpsilon);
+    return torch::relu(torch::group_norm(in, groups_, norm_weight_, norm_bias_, kNormEpsilon));
   }
 
  private:
@@ -58,10 +56,7 @@ ConvStem::ConvStem(std::int64_t width, std::int64_t depth, const Placement& plac
 
 torch::Tensor ConvStem::forward(const torch::Tensor& images) const {
   torch::Tensor maps = images;
-  for (std::size_t i = 0; i < units_.size(); ++i) {
-    const torch::Tensor change = units_[i]->normalised(maps);
-    maps = torch::relu(i < kReducingUnits ? change : maps + change);
-  }
+  for (const auto& unit : units_) maps = unit->forward(maps);
   return proj_->forward(maps.flatten(2).transpose(1, 2));
 }
 

@@ -19,8 +19,7 @@ class ConvUnit;
 
 class ConvStem : public torch::nn::Module {
  public:
-  // Four units bring the picture down to the resolution of the tokens; `depth` more follow there, each of which
-  // adds to what it is given (He et al. 2016).
+  // `depth` is the number of convolutions at the resolution of the tokens.
   ConvStem(std::int64_t width, std::int64_t depth, const Placement& placement);
 
   // images (B, 3, H, W), H and W multiples of 16 -> (B, H / 16 * W / 16, width), row-major.

@@ -22,13 +22,11 @@ train() {
 }
 
 prepare() {
-  say "the rendered world, and another one for pre-training"
+  say "the rendered world"
   [ -f data/world/world.json ] || "$program" sample --out data/world
-  [ -f data/pretraining_world/world.json ] ||
-    "$program" sample --out data/pretraining_world --seed 100 --share 1.5
   say "training pools: every annotation packed into shards"
   local pool
-  for pool in animal3d ctrlani3d superanimal pretraining; do
+  for pool in animal3d ctrlani3d superanimal; do
     "$program" build --config "configs/world_pools/$pool.json" --out "$home/pools/$pool"
   done
   [ -f "$home/initial.safetensors" ] && [ -f "$home/priors.safetensors" ] ||
@@ -38,17 +36,16 @@ prepare() {
   train --config configs/world_training.json --stage pretrain --out "$home/pretrain"
 }
 
-# The training config's layers for a schedule and a seed; Stage 3 reads what this loop's Stage 2 made, with the weight
-# of CtrlAni3D: a pseudo label is a 3D label.
+# The training config's layers for a schedule and a seed; Stage 3 reads what this loop's Stage 2 made.
 layers() {
   local schedule=$1 seed=$2 run=$3
   cat >"$run/run.json" <<JSON
 { "network": { "encoders": "../pretrain/model.safetensors" },
-  "pools": { "quadruped3d": { "shards": ["stage2/latest"], "weight": 0.5 } },
+  "pools": { "quadruped3d": { "shards": ["stage2/latest"], "weight": 0.15 } },
   "model_dtype": "float16",
   "seed": $seed }
 JSON
-  printf -- '--config configs/world_training.json --config configs/world_training_heads.json '
+  printf -- '--config configs/world_training.json '
   [ "$schedule" = full ] || printf -- '--config configs/world_training_%s.json ' "$schedule"
   printf -- '--config %s/run.json' "$run"
 }

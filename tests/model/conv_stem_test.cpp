@@ -20,14 +20,13 @@ TEST(ConvStem, FollowsTheHandComputedMaps) {
   torch::manual_seed(5);
   const torch::Tensor images = torch::randn({2, 3, 64, 32}, torch::kFloat64);
   // All channels are equal, so group norm standardises each picture's map by itself.
-  const auto normalised = [](const torch::Tensor& map, std::int64_t stride) {
+  const auto unit = [](const torch::Tensor& map, std::int64_t stride) {
     const torch::Tensor kept = map.slice(1, 0, map.size(1), stride).slice(2, 0, map.size(2), stride);
     const torch::Tensor centred = kept - kept.mean({1, 2}, true);
-    return centred / (centred.square().mean({1, 2}, true) + 1e-5).sqrt();
+    return torch::relu(centred / (centred.square().mean({1, 2}, true) + 1e-5).sqrt());
   };
   torch::Tensor expected = images.select(1, 0);
-  for (const std::int64_t stride : {4, 2, 1, 2}) expected = torch::relu(normalised(expected, stride));
-  expected = torch::relu(expected + normalised(expected, 1));
+  for (const std::int64_t stride : {4, 2, 1, 2, 1}) expected = unit(expected, stride);
   const torch::Tensor tokens = stem.forward(images);
   ASSERT_EQ(tokens.sizes(), (at::IntArrayRef{2, 8, 64}));
   EXPECT_GT(expected.abs().max().item<double>(), 0.1);
