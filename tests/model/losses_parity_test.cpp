@@ -107,7 +107,9 @@ class LossesParity : public ::testing::TestWithParam<std::string> {
     return total_loss(loss_terms(predict(), targets_, priors_, variant), weights_of(meta_));
   }
 
-  void expect_terms(const std::string& prefix, const LossTerms& terms) const {
+  // `rounding`: relative, of our own side. The golden numbers' is in their table.
+  void expect_terms(const std::string& prefix, const LossTerms& terms, double rounding) const {
+    const nlohmann::json& golden_rounding = meta_.at("fp32_vs_fp64_rel");
     const torch::Tensor half_prior = 0.5 * terms.pose_prior.value();
     const std::map<std::string, torch::Tensor> by_name = {
         {"loss_keypoints_2d", terms.keypoints_2d},
@@ -127,7 +129,8 @@ class LossesParity : public ::testing::TestWithParam<std::string> {
         {"loss", total_loss(terms, weights_of(meta_))}};
     for (const auto& [name, got] : by_name) {
       const double expected = file_.tensor(prefix + name).item<double>();
-      EXPECT_NEAR(got.item<double>(), expected, 1e-5 * std::abs(expected)) << prefix << name;
+      const double tolerance = 1e-5 + golden_rounding.at(name).get<double>() + rounding;
+      EXPECT_NEAR(got.item<double>(), expected, tolerance * std::abs(expected)) << prefix << name;
     }
   }
 
@@ -170,27 +173,35 @@ class ExactLossesParity : public LossesParity {
   ExactLossesParity() : LossesParity(torch::kFloat64) {}
 };
 
+// In float32 network B has a joint whose 6D columns are nearly parallel, which makes rounding that differs
+// from one instruction set to the next (AVX2, AVX-512) show up to 4e-5 in its pose prior and 1e-4 in
+// gradients. float64 tells the formulas apart from that.
 TEST_P(LossesParity, EachTerm) {
   const torch::NoGradGuard no_grad;
-  expect_terms("term_", loss_terms(predict(), targets_, priors_, LossVariant::official));
+  expect_terms("term_", loss_terms(predict(), targets_, priors_, LossVariant::official), 1e-4);
 }
 
-TEST_P(LossesParity, EachTermWhenAllSamplesHaveTruth) {
+TEST_P(ExactLossesParity, EachTerm) {
+  const torch::NoGradGuard no_grad;
+  expect_terms("term_", loss_terms(predict(), targets_, priors_, LossVariant::official), 0.0);
+}
+
+TEST_P(ExactLossesParity, EachTermWhenAllSamplesHaveTruth) {
   const torch::NoGradGuard no_grad;
   Targets targets = targets_;
   targets.has_pose = torch::ones_like(targets.has_pose);
   targets.has_betas = torch::ones_like(targets.has_betas);
-  expect_terms("allgt_term_", loss_terms(predict(), targets, priors_, LossVariant::official));
+  expect_terms("allgt_term_", loss_terms(predict(), targets, priors_, LossVariant::official), 0.0);
 }
 
 TEST_P(LossesParity, SoundVariantHasTheSameValueAndGradients) {
   loss(LossVariant::sound).backward();
-  expect_gradient_norms(1e-4);
+  expect_gradient_norms(2e-4);
 }
 
 TEST_P(LossesParity, GradientNorms) {
   loss().backward();
-  expect_gradient_norms(5e-5);
+  expect_gradient_norms(2e-4);
 }
 
 // What is left is the rounding of the golden float32 numbers themselves.

@@ -87,13 +87,6 @@ TEST(BuildConfig, ReadsLabelsOfOnesOwn) {
 TEST(BuildConfig, ReadsWhatIsToBeLeftOut) {
   json document = good();
   EXPECT_FALSE(parse_build_config(document, "t").leakage);
-  document["datasets"].push_back({{"name", "truth"},
-                                  {"format", "prima"},
-                                  {"root", "r"},
-                                  {"annotations", "t"},
-                                  {"role", "truth"},
-                                  {"body_model", "smal.safetensors"},
-                                  {"keypoints_3d", "body"}});
   document["veto"] = "list.txt";
   document["leakage"] = {{"test_sets", document["datasets"]}, {"max_distance", 3}};
   const BuildConfig config = parse_build_config(document, "t");
@@ -109,6 +102,13 @@ TEST(BuildConfig, EveryPathIsRelativeToItsFile) {
   json document = good();
   document["datasets"][0] = own_labels();
   document["datasets"][0]["curation"] = "chosen.csv";
+  document["datasets"].push_back({{"name", "truth"},
+                                  {"format", "prima"},
+                                  {"root", "r"},
+                                  {"annotations", "t"},
+                                  {"role", "truth"},
+                                  {"body_model", "smal.safetensors"},
+                                  {"keypoints_3d", "body"}});
   document["veto"] = "list.txt";
   document["leakage"] = {{"test_sets", document["datasets"]}};
   std::ofstream(scratch.path() / "c.json") << document;
