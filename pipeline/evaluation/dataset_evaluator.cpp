@@ -50,7 +50,7 @@ class RecordEvaluator {
       if (records[i].failure == Reason::no_visible_keypoints) records[i].failure = Reason::none;
       result.failure = records[i].failure;
       result.detail = records[i].failure_detail;
-      candidates_.push_back({std::move(records[i]), {}});
+      candidates_.emplace_back().record = std::move(records[i]);
     }
     units_ = cut_units(candidates_.size());
   }
