@@ -9,14 +9,19 @@
 //   <key>/table                          (rows) of { index, values_block_0[columns] }
 //   <key>.attrs["non_index_axes"]        the columns' names, pickled
 //
-// Every claim of the file is checked against its size before memory is taken for it.
+// Every claim of the file is checked against its size before memory is taken for it. That is not enough:
+// HDF5 1.10 reads beyond its own buffers where an attribute's name is damaged (H5O__attr_exists), so the file
+// is read in a process of its own.
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstring>
+#include <nlohmann/json.hpp>
 #include <stdexcept>
 
 #include "loaders/label_table.h"
+#include "loaders/own_process.h"
 #include "loaders/pickled_names.h"
 #include "manifests/hdf5.h"
 
@@ -29,6 +34,7 @@ using manifests::hdf5::Handle;
 constexpr std::uint64_t kMaxBytes = std::uint64_t{4} << 30U;
 constexpr std::uint64_t kMaxCompression = 1100;  // deflate reaches 1032
 constexpr std::int64_t kMaxLevels = 8;
+constexpr std::chrono::seconds kMaxTime{600};
 
 [[noreturn]] void refuse(const std::string& name, const std::string& got, const std::string& expected) {
   throw std::runtime_error(fmt::format("{}: got {}, expected {}", name, got, expected));
@@ -321,16 +327,66 @@ LabelTable read_open_file(hid_t file, std::uint64_t file_bytes) {
   return table;
 }
 
-}  // namespace
+// A table as bytes and back, for the way between two processes of one machine.
+std::string packed(const LabelTable& table) {
+  nlohmann::json columns = nlohmann::json::array();
+  for (const LabelColumn& column : table.columns) {
+    columns.push_back({column.scorer, column.individual, column.bodypart, column.coordinate});
+  }
+  const auto* values = reinterpret_cast<const std::uint8_t*>(table.values.data());
+  std::string bytes;
+  nlohmann::json::to_cbor(
+      {{"columns", std::move(columns)},
+       {"rows", table.rows},
+       {"rows_are_numbers", table.rows_are_numbers},
+       {"values", nlohmann::json::binary({values, values + table.values.size() * sizeof(double)})}},
+      bytes);
+  return bytes;
+}
 
-LabelTable read_label_hdf5(const std::filesystem::path& file) {
-  const manifests::hdf5::Session session;
+LabelTable unpacked(const std::string& bytes) {
+  const nlohmann::json object = nlohmann::json::from_cbor(bytes);
+  LabelTable table;
+  for (const nlohmann::json& names : object.at("columns")) {
+    table.columns.push_back({names.at(0), names.at(1), names.at(2), names.at(3)});
+  }
+  table.rows = object.at("rows").get<std::vector<std::string>>();
+  table.rows_are_numbers = object.at("rows_are_numbers");
+  const auto& values = object.at("values").get_binary();
+  table.values.resize(values.size() / sizeof(double));
+  if (!values.empty()) std::memcpy(table.values.data(), values.data(), values.size());
+  return table;
+}
+
+// With HDF5's lock held.
+LabelTable read_file(const std::filesystem::path& file) {
+  const Handle opened(H5Fopen(file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose, "HDF5");
+  return read_open_file(opened.get(), std::filesystem::file_size(file));
+}
+
+// Calls `read`, and names the file where it fails.
+template <typename Read>
+LabelTable naming(const std::filesystem::path& file, Read read) {
   try {
-    const Handle opened(H5Fopen(file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose, "HDF5");
-    return read_open_file(opened.get(), std::filesystem::file_size(file));
+    return read();
   } catch (const std::runtime_error& error) {
     throw std::runtime_error(fmt::format("{}: {}", file.string(), error.what()));
   }
+}
+
+}  // namespace
+
+LabelTable read_label_hdf5(const std::filesystem::path& file) {
+  // The lock is taken here: no other thread may hold it when the child begins.
+  const manifests::hdf5::Session session;
+  return naming(file, [&file] {
+    return unpacked(in_own_process([&file] { return packed(read_file(file)); }, kMaxTime));
+  });
+}
+
+LabelTable read_label_hdf5_here(const std::filesystem::path& file) {
+  const manifests::hdf5::Session session;
+  return naming(file, [&file] { return read_file(file); });
 }
 
 }  // namespace q3d::loaders

@@ -12,7 +12,7 @@
 
 namespace q3d::loaders {
 
-LabelTable read_label_table(const std::filesystem::path& file) {
+bool is_hdf5(const std::filesystem::path& file) {
   constexpr std::string_view kSignature = "\x89HDF\r\n\x1a\n";
   std::array<char, kSignature.size()> start{};
   std::ifstream stream(file, std::ios::binary);
@@ -21,8 +21,11 @@ LabelTable read_label_table(const std::filesystem::path& file) {
         fmt::format("{}: got nothing that can be read, expected DeepLabCut's .h5 or .csv", file.string()));
   }
   stream.read(start.data(), start.size());
-  const bool is_hdf5 = stream && std::string_view(start.data(), start.size()) == kSignature;
-  return is_hdf5 ? read_label_hdf5(file) : read_label_csv(file);
+  return stream && std::string_view(start.data(), start.size()) == kSignature;
+}
+
+LabelTable read_label_table(const std::filesystem::path& file) {
+  return is_hdf5(file) ? read_label_hdf5(file) : read_label_csv(file);
 }
 
 LabelColumn label_column(std::vector<std::string> names, const std::string& where) {

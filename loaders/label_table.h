@@ -29,10 +29,14 @@ struct LabelTable {
 
 // By content: HDF5 or CSV. Throws std::runtime_error naming file, place, got and expected.
 LabelTable read_label_table(const std::filesystem::path& file);
+bool is_hdf5(const std::filesystem::path& file);
 
-// The two by themselves.
+// The two by themselves. HDF5 is read in a process of its own: a damaged file can crash that library.
 LabelTable read_label_csv(const std::filesystem::path& file);
 LabelTable read_label_hdf5(const std::filesystem::path& file);
+
+// In this process, for fuzzing, which sees no other.
+LabelTable read_label_hdf5_here(const std::filesystem::path& file);
 
 // The names of a column, scorer first, as the file's levels give them: three, or four with individuals.
 // Throws std::runtime_error for another number of them, naming `where`.
