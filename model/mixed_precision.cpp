@@ -1,7 +1,7 @@
 #include "model/mixed_precision.h"
 
-#include <ATen/Version.h>
 #include <ATen/autocast_mode.h>
+#include <ATen/cpu/Utils.h>
 
 namespace q3d::model {
 
@@ -20,9 +20,11 @@ MixedPrecision::~MixedPrecision() {
   at::autocast::set_autocast_dtype(kind_, previous_dtype_);
 }
 
-bool bfloat16_is_slow(torch::Device device) {
-  const std::string vectors = at::get_cpu_capability();
-  return device.is_cpu() && (vectors == "AVX2" || vectors == "DEFAULT");
+bool bfloat16_is_fast(torch::Device device) {
+  if (!device.is_cpu()) return true;
+  const auto capabilities = at::cpu::get_cpu_capabilities();
+  const auto found = capabilities.find("avx512_bf16");
+  return found != capabilities.end() && found->second.toBool();
 }
 
 }  // namespace q3d::model

@@ -22,8 +22,8 @@ class MixedPrecision {
   torch::ScalarType previous_dtype_;
 };
 
-// Whether bfloat16 costs time on `device` instead of saving it: LibTorch's convolutions need AVX-512 for it
-// on x86 and otherwise take a path that is about ten times slower than float32.
-bool bfloat16_is_slow(torch::Device device);
+// Whether bfloat16 saves time on `device`: GPUs, and x86 processors that multiply it themselves
+// (AVX512_BF16). On others LibTorch's convolutions in it are about ten times slower than in float32.
+bool bfloat16_is_fast(torch::Device device);
 
 }  // namespace q3d::model

@@ -39,7 +39,7 @@ void parse_network(const json& object, const std::string& where, TrainingNetwork
   fields.read("precision", network.precision);
   fields.read("compute_threads", network.compute_threads);
   fields.finish();
-  require_one_of(network.precision, {"float32", "bfloat16"}, where + ": precision");
+  require_one_of(network.precision, {"auto", "float32", "bfloat16"}, where + ": precision");
   require(network.compute_threads >= 0, where, "\"compute_threads\" must be 0 (all cores) or more");
   network.initial = initial;
   network.encoders = encoders;

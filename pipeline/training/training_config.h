@@ -20,8 +20,9 @@ struct TrainingNetworkConfig {
   std::filesystem::path smal_asset;  // safetensors
   std::filesystem::path priors;      // safetensors with pose_prior_loss.* and shape_prior_loss.*
   std::string device = "auto";
-  std::string precision = "float32";  // or bfloat16, of the forward pass
-  int compute_threads = 0;            // 0 = all cores; can change the last bits
+  std::string precision =
+      "float32";            // of the forward pass: float32, bfloat16, or auto: what suits the device
+  int compute_threads = 0;  // 0 = all cores; can change the last bits
 };
 
 struct PoolConfig {

@@ -96,6 +96,14 @@ model::TrainingBatch to_tensors(FeedBatch&& from) {
   return result;
 }
 
+// The config with "auto" replaced by what suits the device. The run's key has "auto" all the same, as for the
+// device.
+TrainingConfig for_device(TrainingConfig config, torch::Device device) {
+  std::string& precision = config.network.precision;
+  if (precision == "auto") precision = model::bfloat16_is_fast(device) ? "bfloat16" : "float32";
+  return config;
+}
+
 // The initial network, with the encoders of another checkpoint where the config names one.
 std::shared_ptr<model::PrimaNet> initial_net(const TrainingNetworkConfig& network,
                                              const smal::SmalAsset& asset, torch::Device device) {
@@ -211,10 +219,10 @@ Feed open_feed(const TrainingConfig& config, const PhaseConfig& phase, int phase
 class Run {
  public:
   Run(const TrainingConfig& config, const TrainingOptions& options)
-      : config_(config),
-        options_(options),
+      : options_(options),
         place_(find_place()),
         device_(choose_device(config.network, place_)),
+        config_(for_device(config, device_.device)),
         ranks_(model::join_ranks(place_, device_.device)),
         lock_(leads() ? std::make_unique<manifests::FolderLock>(made(options.out)) : nullptr),
         asset_(smal::load_asset(config.network.smal_asset)),
@@ -227,13 +235,13 @@ class Run {
     manifests::remove_temporaries(options.out);
     if (options.quiet) return;
     if (!device_.warning.empty()) fmt::print(stderr, "warning: {}\n", device_.warning);
-    if (config.network.precision == "bfloat16" && model::bfloat16_is_slow(device_.device)) {
+    if (config_.network.precision == "bfloat16" && !model::bfloat16_is_fast(device_.device)) {
       fmt::print(
           stderr,
-          "warning: this processor has no AVX-512, without which convolutions in bfloat16 are about ten "
-          "times slower than in float32; set network.precision to \"float32\"\n");
+          "warning: this processor does not multiply in bfloat16 (AVX512_BF16), so convolutions in it are "
+          "about ten times slower than in float32; \"precision\": \"auto\" takes the faster\n");
     }
-    fmt::print(stderr, "training on {}\n", device_.description);
+    fmt::print(stderr, "training on {} in {}\n", device_.description, config_.network.precision);
     if (ranks_->size() > 1) {
       fmt::print(stderr, "{} ranks, each with {} of a batch's {} samples\n", ranks_->size(),
                  config.feed.batch / ranks_->size(), config.feed.batch);
@@ -385,11 +393,11 @@ class Run {
     return path;
   }
 
-  const TrainingConfig& config_;
   const TrainingOptions& options_;
   Clock::time_point start_ = Clock::now();
   model::RankPlace place_;
   model::DeviceChoice device_;
+  TrainingConfig config_;
   std::shared_ptr<const model::Collective> ranks_;
   std::unique_ptr<manifests::FolderLock> lock_;  // rank 0's
   smal::SmalAsset asset_;
