@@ -35,6 +35,12 @@ void parse_network(const json& object, const std::string& where, TrainingNetwork
   fields.read("encoders", encoders);
   fields.require("smal_asset", smal_asset);
   fields.require("priors", priors);
+  if (const json* parts = fields.child("without")) {
+    network.without = texts(*parts, where + ": without");
+    for (const std::string& part : network.without) {
+      require_one_of(part, {"bio_features", "initial_betas", "keypoint_tokens"}, where + ": without");
+    }
+  }
   fields.read("device", network.device);
   fields.read("precision", network.precision);
   fields.read("compute_threads", network.compute_threads);

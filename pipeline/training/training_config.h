@@ -19,6 +19,7 @@ struct TrainingNetworkConfig {
   std::filesystem::path encoders;  // checkpoint whose two image encoders replace those of `initial`; or empty
   std::filesystem::path smal_asset;  // safetensors
   std::filesystem::path priors;      // safetensors with pose_prior_loss.* and shape_prior_loss.*
+  std::vector<std::string> without;  // ablations: bio_features, initial_betas, keypoint_tokens
   std::string device = "auto";
   std::string precision =
       "float32";            // of the forward pass: float32, bfloat16, or auto: what suits the device

@@ -104,17 +104,32 @@ TrainingConfig for_device(TrainingConfig config, torch::Device device) {
   return config;
 }
 
-// The initial network, with the encoders of another checkpoint where the config names one.
+// The sizes of `file`'s network, and the switches of the paper's ablations.
+model::PrimaConfig initial_config(const smal::SafeTensors& file, const std::vector<std::string>& without) {
+  model::PrimaConfig config = model::checkpoint_config(file);
+  for (const std::string& part : without) {
+    if (part == "bio_features") config.learn_bio_encoder = true;
+    if (part == "initial_betas") config.betas_from_bio = false;
+    if (part == "keypoint_tokens") config.keypoint_tokens = false;
+  }
+  return config;
+}
+
+// The initial network, with the encoders of another checkpoint where the config names one; one that learns
+// its bio encoder from random weights takes the backbone alone.
 std::shared_ptr<model::PrimaNet> initial_net(const TrainingNetworkConfig& network,
                                              const smal::SmalAsset& asset, torch::Device device) {
   const smal::SafeTensors file = smal::SafeTensors::open(network.initial);
-  auto net = model::load_net(file, model::checkpoint_config(file), asset, {device, torch::kFloat32});
+  const model::PrimaConfig config = initial_config(file, network.without);
+  auto net = model::load_net(file, config, asset, {device, torch::kFloat32});
   if (network.encoders.empty()) return net;
   const torch::NoGradGuard no_grad;
   const smal::SafeTensors encoders = smal::SafeTensors::open(network.encoders);
   for (auto& parameter : net->named_parameters()) {
     const std::string& name = parameter.key();
-    if (!name.starts_with("backbone.") && !name.starts_with("bioclip_embedding.species_model.")) continue;
+    const bool taken = name.starts_with("backbone.") ||
+                       (name.starts_with("bioclip_embedding.species_model.") && !config.learn_bio_encoder);
+    if (!taken) continue;
     const torch::Tensor stored = encoders.tensor(name);
     if (stored.sizes() != parameter.value().sizes()) {
       throw std::runtime_error(fmt::format("{}: {} has another shape than in {}", network.encoders.string(),

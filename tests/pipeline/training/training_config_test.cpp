@@ -103,6 +103,8 @@ INSTANTIATE_TEST_SUITE_P(
         Mutation{"/bach", "1", "did you mean \"batch\"?"}, Mutation{"/batch", "0", "1 to 65536"},
         Mutation{"/network/initial", "3", "must be"},
         Mutation{"/network/precision", "\"float16\"", "float32, bfloat16"},
+        Mutation{"/network/without", "[\"bio\"]", "bio_features, initial_betas, keypoint_tokens"},
+        Mutation{"/network/without", "[]", "at least one"},
         Mutation{"/network/compute_threads", "-1", "0 (all cores) or more"},
         Mutation{"/pools", "{}", "at least one"}, Mutation{"/pools/animal3d/shards", "[]", "at least one"},
         Mutation{"/pools/animal3d/shards", "[1]", "list of texts"},

@@ -151,6 +151,28 @@ TEST_F(TrainingRun, EncodersMayComeFromAnotherCheckpoint) {
   EXPECT_TRUE(torch::equal(after.tensor(frozen), smal::SafeTensors::open(path("other")).tensor(frozen)));
 }
 
+TEST_F(TrainingRun, AnAblationTravelsWithTheWeights) {
+  config_.network.without = {"initial_betas", "keypoint_tokens"};
+  const auto sizes = model::checkpoint_config(smal::SafeTensors::open(run("out").model));
+  EXPECT_FALSE(sizes.betas_from_bio);
+  EXPECT_FALSE(sizes.keypoint_tokens);
+  EXPECT_FALSE(sizes.learn_bio_encoder);
+}
+
+TEST_F(TrainingRun, WithoutBioFeaturesTheBioEncoderStartsAnewAndLearns) {
+  const std::string bio = "bioclip_embedding.species_model.visual.conv1.weight";
+  const smal::SafeTensors initial = smal::SafeTensors::open(path("initial"));
+  model::write_initial_checkpoint(path("other"), model::checkpoint_config(initial), 99);
+  config_.network.encoders = path("other");
+  config_.network.without = {"bio_features"};
+  run("none", 0);
+  const smal::SafeTensors after = smal::SafeTensors::open(path("none/model.safetensors"));
+  const double from_initial = (after.tensor(bio) - initial.tensor(bio)).abs().max().item<double>();
+  EXPECT_GT(from_initial, 0.0);
+  EXPECT_LT(from_initial, 0.02);  // six steps of at most 1e-3, and weight decay
+  EXPECT_TRUE(model::checkpoint_config(after).learn_bio_encoder);
+}
+
 TEST_F(TrainingRun, ALossThatIsNotFiniteNamesTheSamples) {
   manifests::ShardSample bad = testing::shard_sample("poison/0", 5, true);
   bad.betas[3] = std::numeric_limits<float>::infinity();
