@@ -41,7 +41,7 @@ layers() {
   local schedule=$1 seed=$2 run=$3
   cat >"$run/run.json" <<JSON
 { "network": { "encoders": "../pretrain/model.safetensors" },
-  "pools": { "quadruped3d": { "shards": ["stage2/latest"], "weight": 0.15 } },
+  "pools": { "quadruped3d": { "shards": ["stage2/latest"], "weight": 0.5 } },
   "model_dtype": "float16",
   "seed": $seed }
 JSON
