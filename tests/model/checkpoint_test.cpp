@@ -175,8 +175,8 @@ TEST(OfficialNames, FullSizeNetworkHasThemAll) {
   const auto official = nlohmann::json::parse(stream);
   ASSERT_EQ(official.size(), 955U);
   std::map<std::string, std::vector<std::int64_t>> required, ours;
-  for (const auto& [name, shape] : official.items()) {
-    if (!is_allowed_extra(name)) required[name] = shape.get<std::vector<std::int64_t>>();
+  for (const auto& [name, entry] : official.items()) {
+    if (!is_allowed_extra(name)) required[name] = entry.at("shape").get<std::vector<std::int64_t>>();
   }
   std::int64_t total = 0;
   for (const TensorSpec& spec : expected_tensors(named_config("vith"))) {

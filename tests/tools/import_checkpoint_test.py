@@ -154,7 +154,7 @@ class ImportTest(CheckpointCase):
 
 class OfficialNamesTest(unittest.TestCase):
     def test_the_955_tensors(self):
-        with open(os.path.join(support.HERE, "official_state_dict.json"), encoding="utf-8") as file:
+        with open(os.path.join(support.ROOT, "tests", "data", "official_state_dict.json"), encoding="utf-8") as file:
             official = json.load(file)
         expected = prima_names.expected_tensors(prima_names.OFFICIAL_CONFIG)
         types = {"float32": "F32", "int32": "I32", "bool": "BOOL"}
