@@ -25,11 +25,11 @@ test: build  ## build everything and run all tests
 
 program: $(BUILD)/build.ninja  ## compile the program alone (release unless PRESET says otherwise)
 	@cmake --build $(BUILD) --parallel $(JOBS) --target quadruped3d
-	@ln -sfn $(PRESET)/pipeline/quadruped3d build/quadruped3d
+	@ln -sfn $(PRESET)/bin/quadruped3d build/quadruped3d
 
 build: $(BUILD)/build.ninja  ## compile everything, tests too
 	@cmake --build $(BUILD) --parallel $(JOBS)
-	@ln -sfn $(PRESET)/pipeline/quadruped3d build/quadruped3d
+	@ln -sfn $(PRESET)/bin/quadruped3d build/quadruped3d
 
 setup:  ## install Debian packages and LibTorch where they are missing
 	@tools/setup.sh

@@ -16,10 +16,10 @@
 #include <thread>
 #include <vector>
 
-#include "loaders/encode.h"
-#include "loaders/stored_crop.h"
+#include "loaders/pictures/encode.h"
+#include "loaders/pictures/stored_crop.h"
 #include "manifests/shard.h"
-#include "pipeline/training/feed.h"
+#include "pipeline/feed/feed.h"
 
 namespace {
 
@@ -49,9 +49,10 @@ void write_made_shard(const fs::path& path) {
     manifests::ShardSample& sample = samples.emplace_back();
     sample.record.id = fmt::format("made/{}", i);
     sample.record.box = {200, 150, 380, 300};
-    const loaders::SquareBox box = loaders::square_box(sample.record.box);
-    const loaders::StoredCrop stored = loaders::make_stored_crop(picture(i), cv::Mat(), box);
-    sample.crop = loaders::encode_jpeg(stored.rgb, 95);
+    const loaders::pictures::SquareBox box = loaders::pictures::square_box(sample.record.box);
+    const loaders::pictures::StoredCrop stored =
+        loaders::pictures::make_stored_crop(picture(i), cv::Mat(), box);
+    sample.crop = loaders::pictures::encode_jpeg(stored.rgb, 95);
     bytes += sample.crop.size();
     sample.crop_side_px = stored.rgb.rows;
     sample.crop_from_image = stored.from_image;
@@ -65,9 +66,9 @@ void write_made_shard(const fs::path& path) {
 }
 
 void measure(const std::vector<fs::path>& shards, int threads, double seconds) {
-  std::vector<pipeline::ShardPool> pools;
+  std::vector<pipeline::feed::ShardPool> pools;
   pools.emplace_back("bench", shards);
-  const pipeline::Feed feed(std::move(pools), {1.0}, {.batch = 48, .threads = threads}, 1);
+  const pipeline::feed::Feed feed(std::move(pools), {1.0}, {.batch = 48, .threads = threads}, 1);
   feed.batch(0);  // the first touches cold files
   const auto start = std::chrono::steady_clock::now();
   double elapsed = 0.0;

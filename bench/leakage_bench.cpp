@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "filters/near_duplicates.h"
-#include "loaders/encode.h"
-#include "pipeline/picture_hashes.h"
+#include "loaders/pictures/encode.h"
+#include "pipeline/leakage/picture_hashes.h"
 
 namespace {
 
@@ -40,7 +40,7 @@ std::vector<std::byte> picture(unsigned seed) {
   cv::Mat grain(canvas.size(), CV_16SC3);
   cv::RNG(seed).fill(grain, cv::RNG::NORMAL, 0, 8);
   cv::add(canvas, grain, canvas, cv::noArray(), CV_8UC3);
-  return loaders::encode_jpeg(canvas, 90);
+  return loaders::pictures::encode_jpeg(canvas, 90);
 }
 
 // 100 files, each under 100 digests: the work of 10,000 pictures without a gigabyte on the disk.
@@ -63,7 +63,7 @@ class PictureFiles {
   PictureFiles& operator=(const PictureFiles&) = delete;
 
   fs::path cache() const { return folder_ / "hashes.txt"; }
-  std::vector<pipeline::PictureFile> files;
+  std::vector<pipeline::leakage::PictureFile> files;
 
  private:
   fs::path folder_;
@@ -74,7 +74,7 @@ void hash_pictures(benchmark::State& state) {
   const PictureFiles made;
   for (auto _ : state) {
     fs::remove(made.cache());
-    pipeline::PictureHashes hashes(made.cache());
+    pipeline::leakage::PictureHashes hashes(made.cache());
     hashes.add(made.files, /*quiet=*/true);
     benchmark::DoNotOptimize(hashes.find(made.files.front().sha256));
   }
@@ -86,9 +86,9 @@ BENCHMARK(hash_pictures)->Unit(benchmark::kMillisecond)->UseRealTime()->Iteratio
 // What a second run does: reads the cache.
 void hashes_from_cache(benchmark::State& state) {
   const PictureFiles made;
-  pipeline::PictureHashes(made.cache()).add(made.files, /*quiet=*/true);
+  pipeline::leakage::PictureHashes(made.cache()).add(made.files, /*quiet=*/true);
   for (auto _ : state) {
-    pipeline::PictureHashes hashes(made.cache());
+    pipeline::leakage::PictureHashes hashes(made.cache());
     hashes.add(made.files, /*quiet=*/true);
     benchmark::DoNotOptimize(hashes.find(made.files.front().sha256));
   }

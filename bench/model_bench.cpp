@@ -15,7 +15,7 @@
 #include "model/net.h"
 #include "model/prima.h"
 #include "model/tta.h"
-#include "smal/synthetic_quadruped.h"
+#include "pipeline/animal/synthetic_quadruped.h"
 
 namespace q3d::model {
 namespace {
@@ -39,7 +39,8 @@ const Prima& network(const Setting& setting) {
     initialise(*net, 1);
     net->eval();
     for (auto& parameter : net->parameters()) parameter.set_requires_grad(false);
-    held = std::make_unique<Prima>(net, smal::SmalBody(smal::make_synthetic_quadruped(), device));
+    held = std::make_unique<Prima>(
+        net, smal::tensors::SmalBody(pipeline::animal::make_synthetic_quadruped(), device));
     held_name = name;
   }
   return *held;

@@ -4,8 +4,8 @@
 
 #include <stdexcept>
 
-#include "smal/camera.h"
-#include "smal/rotation.h"
+#include "smal/tensors/camera.h"
+#include "smal/tensors/rotation.h"
 
 namespace q3d::model {
 namespace {
@@ -30,26 +30,29 @@ void require_features(const PrimaNet& net, const ImageFeatures& features) {
 }
 
 torch::Tensor pose_rotations(const torch::Tensor& pose_6d) {
-  return smal::rot6d_to_matrix(pose_6d.unflatten(1, {kJoints, 6}));
+  return smal::tensors::rot6d_to_matrix(pose_6d.unflatten(1, {kJoints, 6}));
 }
 
-torch::Tensor projected_keypoints(const smal::SmalBody& body, const DecoderOutput& output, double focal_px) {
+torch::Tensor projected_keypoints(const smal::tensors::SmalBody& body, const DecoderOutput& output,
+                                  double focal_px) {
   const torch::Tensor keypoints = body.keypoints(pose_rotations(output.pose_6d), output.betas);
-  return smal::project_to_crop(keypoints, smal::translation_from_camera(output.camera, focal_px), focal_px);
+  return smal::tensors::project_to_crop(
+      keypoints, smal::tensors::translation_from_camera(output.camera, focal_px), focal_px);
 }
 
-Prediction assemble(const PrimaNet& net, const smal::SmalBody& body, const DecoderOutput& output,
+Prediction assemble(const PrimaNet& net, const smal::tensors::SmalBody& body, const DecoderOutput& output,
                     const torch::Tensor& initial_betas, bool with_vertices) {
   const double focal_px = net.config().focal_px;
   Prediction prediction;
   prediction.rotations = pose_rotations(output.pose_6d);
   prediction.betas = output.betas;
   prediction.camera = output.camera;
-  prediction.translation = smal::translation_from_camera(output.camera, focal_px);
+  prediction.translation = smal::tensors::translation_from_camera(output.camera, focal_px);
   // Always by the same route, so that asking for vertices changes no bit of the keypoints.
   prediction.keypoints_3d = body.keypoints(prediction.rotations, output.betas);
   if (with_vertices) prediction.vertices = body.forward(prediction.rotations, output.betas).vertices;
-  prediction.keypoints_2d = smal::project_to_crop(prediction.keypoints_3d, prediction.translation, focal_px);
+  prediction.keypoints_2d =
+      smal::tensors::project_to_crop(prediction.keypoints_3d, prediction.translation, focal_px);
   prediction.aux_keypoints_2d = output.aux_keypoints_2d;
   prediction.aux_keypoints_3d = output.aux_keypoints_3d;
   prediction.init_betas = initial_betas;

@@ -6,7 +6,7 @@
 #include "model/decoder.h"
 #include "model/net.h"
 #include "model/prima.h"
-#include "smal/body.h"
+#include "smal/tensors/body.h"
 
 namespace q3d::model {
 
@@ -17,10 +17,11 @@ void require_features(const PrimaNet& net, const ImageFeatures& features);
 torch::Tensor pose_rotations(const torch::Tensor& pose_6d);
 
 // The 26 keypoints of the posed body in the crop: (B, 26, 2) crop units. Differentiable.
-torch::Tensor projected_keypoints(const smal::SmalBody& body, const DecoderOutput& output, double focal_px);
+torch::Tensor projected_keypoints(const smal::tensors::SmalBody& body, const DecoderOutput& output,
+                                  double focal_px);
 
 // initial_betas (B, 41). Differentiable.
-Prediction assemble(const PrimaNet& net, const smal::SmalBody& body, const DecoderOutput& output,
+Prediction assemble(const PrimaNet& net, const smal::tensors::SmalBody& body, const DecoderOutput& output,
                     const torch::Tensor& initial_betas, bool with_vertices);
 
 }  // namespace q3d::model

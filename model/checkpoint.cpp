@@ -27,7 +27,7 @@ bool is_float(torch::ScalarType type) {
 }
 
 // The body's buffers in an official checkpoint, by their names there.
-std::map<std::string, torch::Tensor> body_buffers(const smal::SmalAsset& asset) {
+std::map<std::string, torch::Tensor> body_buffers(const smal::tensors::SmalAsset& asset) {
   return {{"smal.shapedirs", asset.shapedirs},     {"smal.v_template", asset.v_template},
           {"smal.posedirs", asset.posedirs},       {"smal.J_regressor", asset.j_regressor},
           {"smal.lbs_weights", asset.lbs_weights}, {"smal.faces", asset.faces},
@@ -43,8 +43,8 @@ void check_entry(const std::string& name, const torch::Tensor& got, at::IntArray
 }
 
 // Every way in which the file differs from the network, one line each.
-std::vector<std::string> find_faults(const smal::SafeTensors& file, const PrimaNet& net,
-                                     const smal::SmalAsset& asset) {
+std::vector<std::string> find_faults(const smal::tensors::SafeTensors& file, const PrimaNet& net,
+                                     const smal::tensors::SmalAsset& asset) {
   std::vector<std::string> faults;
   const auto parameters = net.named_parameters();
   for (const auto& parameter : parameters) {
@@ -111,7 +111,7 @@ bool is_allowed_extra(const std::string& name) {
   return std::any_of(kOthers.begin(), kOthers.end(), starts(view));
 }
 
-PrimaConfig checkpoint_config(const smal::SafeTensors& file) {
+PrimaConfig checkpoint_config(const smal::tensors::SafeTensors& file) {
   const auto entry = file.metadata().find(kConfigKey);
   if (entry == file.metadata().end()) {
     throw std::runtime_error(fmt::format(
@@ -127,8 +127,8 @@ PrimaConfig checkpoint_config(const smal::SafeTensors& file) {
   }
 }
 
-std::shared_ptr<PrimaNet> load_net(const smal::SafeTensors& file, const PrimaConfig& config,
-                                   const smal::SmalAsset& asset, const Placement& placement) {
+std::shared_ptr<PrimaNet> load_net(const smal::tensors::SafeTensors& file, const PrimaConfig& config,
+                                   const smal::tensors::SmalAsset& asset, const Placement& placement) {
   const torch::NoGradGuard no_grad;
   const PrimaNet plan(config, {torch::kMeta, placement.matrix_dtype});
   if (const auto faults = find_faults(file, plan, asset); !faults.empty()) {
@@ -147,11 +147,11 @@ std::shared_ptr<PrimaNet> load_net(const smal::SafeTensors& file, const PrimaCon
 }
 
 void write_checkpoint(const std::filesystem::path& path, const PrimaConfig& config,
-                      const smal::NamedTensors& tensors,
+                      const smal::tensors::NamedTensors& tensors,
                       const std::map<std::string, std::string>& more_metadata) {
   std::map<std::string, std::string> metadata = more_metadata;
   metadata[kConfigKey] = to_json(config).dump();
-  smal::write_safetensors(path, tensors, metadata);
+  smal::tensors::write_safetensors(path, tensors, metadata);
 }
 
 }  // namespace q3d::model

@@ -14,8 +14,8 @@
 #include "model/config.h"
 #include "model/layers.h"
 #include "model/net.h"
-#include "smal/asset.h"
-#include "smal/safetensors.h"
+#include "smal/tensors/asset.h"
+#include "smal/tensors/safetensors.h"
 
 namespace q3d::model {
 
@@ -33,17 +33,17 @@ std::vector<TensorSpec> expected_tensors(const PrimaConfig& config);
 bool is_allowed_extra(const std::string& name);
 
 // The config in the file's metadata. Throws std::runtime_error when it is absent or not valid.
-PrimaConfig checkpoint_config(const smal::SafeTensors& file);
+PrimaConfig checkpoint_config(const smal::tensors::SafeTensors& file);
 
 // Builds the network and copies the weights in, casting float16 and bfloat16 files. Strict: throws
 // std::runtime_error that names every missing, extra, wrong-shaped or wrongly typed tensor; smal.* must have
 // the asset's shapes. At no time are two full copies in memory.
-std::shared_ptr<PrimaNet> load_net(const smal::SafeTensors& file, const PrimaConfig& config,
-                                   const smal::SmalAsset& asset, const Placement& placement);
+std::shared_ptr<PrimaNet> load_net(const smal::tensors::SafeTensors& file, const PrimaConfig& config,
+                                   const smal::tensors::SmalAsset& asset, const Placement& placement);
 
 // Writes the tensors with the config, and what else is given, in the metadata. Throws std::runtime_error.
 void write_checkpoint(const std::filesystem::path& path, const PrimaConfig& config,
-                      const smal::NamedTensors& tensors,
+                      const smal::tensors::NamedTensors& tensors,
                       const std::map<std::string, std::string>& more_metadata = {});
 
 }  // namespace q3d::model

@@ -85,7 +85,7 @@ TokenTargets token_targets(const torch::Tensor& keypoints) {
 }
 
 EncoderTrainer::EncoderTrainer(std::shared_ptr<PrimaNet> net, const EncoderTrainerOptions& options,
-                               std::shared_ptr<const Collective> ranks)
+                               std::shared_ptr<const ranks::Collective> ranks)
     : net_(std::move(net)), options_(options), ranks_(std::move(ranks)), optimiser_({}, options.adamw) {
   if (net_->placement().matrix_dtype != torch::kFloat32) {
     throw std::invalid_argument("encoder trainer: the network must hold float32 weights");
@@ -135,9 +135,9 @@ StepReport EncoderTrainer::step(const TrainingBatch& batch) {
   const torch::Tensor loss = keypoints.value() + backbone.value() + bioclip.value();
   backward_->run(loss);
   const torch::Tensor norm = optimiser_.gradient_norm();
-  const std::vector<double> values =
-      mean_over_ranks(*ranks_, to_host({loss, norm, keypoints.value(), backbone.value(), bioclip.value(),
-                                        backbone_accuracy.value(), bioclip_accuracy.value()}));
+  const std::vector<double> values = ranks::mean_over_ranks(
+      *ranks_, to_host({loss, norm, keypoints.value(), backbone.value(), bioclip.value(),
+                        backbone_accuracy.value(), bioclip_accuracy.value()}));
   StepReport report;
   report.loss = values[0];
   report.gradient_norm = values[1];
@@ -155,8 +155,8 @@ StepReport EncoderTrainer::step(const TrainingBatch& batch) {
   return report;
 }
 
-smal::NamedTensors EncoderTrainer::state() const {
-  smal::NamedTensors state;
+smal::tensors::NamedTensors EncoderTrainer::state() const {
+  smal::tensors::NamedTensors state;
   append_parameters(state, "", *net_);
   append_parameters(state, kHeads, *heads_);
   optimiser_.append_state(state, kOptimiser);
@@ -164,7 +164,7 @@ smal::NamedTensors EncoderTrainer::state() const {
   return state;
 }
 
-void EncoderTrainer::restore(const smal::SafeTensors& file) {
+void EncoderTrainer::restore(const smal::tensors::SafeTensors& file) {
   restore_parameters(file, "", *net_);
   restore_parameters(file, kHeads, *heads_);
   optimiser_.restore_state(file, kOptimiser);

@@ -9,10 +9,10 @@
 #include <cstdint>
 #include <memory>
 
-#include "model/collective.h"
 #include "model/learner.h"
 #include "model/net.h"
 #include "model/optimiser.h"
+#include "model/ranks/collective.h"
 
 namespace q3d::model {
 
@@ -37,12 +37,12 @@ class EncoderTrainer : public Learner {
   // Trains net's encoders and leaves its other parameters alone. Throws std::invalid_argument when the net
   // does not hold float32 or there are fewer than two species.
   EncoderTrainer(std::shared_ptr<PrimaNet> net, const EncoderTrainerOptions& options,
-                 std::shared_ptr<const Collective> ranks = single_rank());
+                 std::shared_ptr<const ranks::Collective> ranks = ranks::single_rank());
 
   PrimaNet& net() const override { return *net_; }
   StepReport step(const TrainingBatch& batch) override;
-  smal::NamedTensors state() const override;
-  void restore(const smal::SafeTensors& file) override;
+  smal::tensors::NamedTensors state() const override;
+  void restore(const smal::tensors::SafeTensors& file) override;
 
  private:
   class Heads;
@@ -56,9 +56,9 @@ class EncoderTrainer : public Learner {
   std::shared_ptr<PrimaNet> net_;
   EncoderTrainerOptions options_;
   std::shared_ptr<Heads> heads_;
-  std::shared_ptr<const Collective> ranks_;
+  std::shared_ptr<const ranks::Collective> ranks_;
   AdamW optimiser_;
-  std::unique_ptr<AveragedBackward> backward_;
+  std::unique_ptr<ranks::AveragedBackward> backward_;
   std::int64_t steps_ = 0;
 };
 

@@ -118,7 +118,7 @@ void initialise(PrimaNet& net, std::uint64_t seed) {
 
 void write_initial_checkpoint(const std::filesystem::path& path, const PrimaConfig& config,
                               std::uint64_t seed, torch::ScalarType dtype) {
-  smal::NamedTensors tensors;
+  smal::tensors::NamedTensors tensors;
   for (const TensorSpec& spec : expected_tensors(config)) {
     tensors.emplace_back(spec.name, initial_tensor(spec, seed).to(dtype));
   }

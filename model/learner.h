@@ -7,10 +7,10 @@
 #include <utility>
 #include <vector>
 
-#include "model/collective.h"
 #include "model/losses.h"
 #include "model/net.h"
-#include "smal/safetensors.h"
+#include "model/ranks/collective.h"
+#include "smal/tensors/safetensors.h"
 
 namespace q3d::model {
 
@@ -49,9 +49,9 @@ class Learner {
 
   // All that the next step depends on but the batch and the random generator: weights under their official
   // names, and under "training." the optimisers and the step count. Equal on all ranks.
-  virtual smal::NamedTensors state() const = 0;
+  virtual smal::tensors::NamedTensors state() const = 0;
   // Throws std::runtime_error naming the tensor, got and expected.
-  virtual void restore(const smal::SafeTensors& file) = 0;
+  virtual void restore(const smal::tensors::SafeTensors& file) = 0;
 };
 
 // One copy from the device for all of them.

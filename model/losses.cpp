@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "model/decoder.h"
-#include "smal/rotation.h"
+#include "smal/tensors/rotation.h"
 
 namespace q3d::model {
 namespace {
@@ -33,8 +33,8 @@ torch::Tensor parameter_loss(const torch::Tensor& predicted, const torch::Tensor
 }
 
 torch::Tensor axis_angles(const torch::Tensor& rotations, LossVariant variant) {
-  return (variant == LossVariant::official ? smal::matrix_to_axis_angle(rotations)
-                                           : smal::matrix_to_axis_angle_smooth(rotations))
+  return (variant == LossVariant::official ? smal::tensors::matrix_to_axis_angle(rotations)
+                                           : smal::tensors::matrix_to_axis_angle_smooth(rotations))
       .flatten(1);
 }
 
@@ -88,7 +88,7 @@ PartialMean contrastive_loss(const torch::Tensor& features, const torch::Tensor&
 }
 
 LossTerms loss_terms(const Prediction& prediction, const Targets& targets, const Priors& priors,
-                     LossVariant variant, const Collective& ranks) {
+                     LossVariant variant, const ranks::Collective& ranks) {
   LossTerms terms;
   terms.keypoints_2d = keypoint_loss(prediction.keypoints_2d, targets.keypoints_2d);
   terms.keypoints_3d = centred_keypoint_loss(prediction.keypoints_3d, targets.keypoints_3d);

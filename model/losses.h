@@ -6,11 +6,11 @@
 
 #include <torch/torch.h>
 
-#include "model/collective.h"
 #include "model/loss_weights.h"
 #include "model/partial_mean.h"
 #include "model/prima.h"
 #include "model/priors.h"
+#include "model/ranks/collective.h"
 
 namespace q3d::model {
 
@@ -40,7 +40,7 @@ struct LossTerms {
 };
 
 LossTerms loss_terms(const Prediction& prediction, const Targets& targets, const Priors& priors,
-                     LossVariant variant, const Collective& ranks = *single_rank());
+                     LossVariant variant, const ranks::Collective& ranks = *ranks::single_rank());
 
 // The weighted sum without the adversarial term. The pose prior, halved, counts with the weights of the
 // global orientation and of the pose; the shape priors with that of the betas, the one of the initial betas

@@ -14,7 +14,7 @@ std::string describe(const torch::Tensor& tensor) {
 
 }  // namespace
 
-void append_parameters(smal::NamedTensors& state, const std::string& prefix,
+void append_parameters(smal::tensors::NamedTensors& state, const std::string& prefix,
                        const torch::nn::Module& module) {
   for (const auto& parameter : module.named_parameters()) {
     state.emplace_back(prefix + parameter.key(),
@@ -22,7 +22,7 @@ void append_parameters(smal::NamedTensors& state, const std::string& prefix,
   }
 }
 
-torch::Tensor restored_like(const smal::SafeTensors& file, const std::string& name,
+torch::Tensor restored_like(const smal::tensors::SafeTensors& file, const std::string& name,
                             const torch::Tensor& like) {
   const torch::Tensor stored = file.tensor(name);
   if (stored.sizes() != like.sizes() || stored.scalar_type() != like.scalar_type()) {
@@ -32,7 +32,8 @@ torch::Tensor restored_like(const smal::SafeTensors& file, const std::string& na
   return stored.to(like.device(), /*non_blocking=*/false, /*copy=*/true);
 }
 
-void restore_parameters(const smal::SafeTensors& file, const std::string& prefix, torch::nn::Module& module) {
+void restore_parameters(const smal::tensors::SafeTensors& file, const std::string& prefix,
+                        torch::nn::Module& module) {
   const torch::NoGradGuard no_grad;
   for (auto& parameter : module.named_parameters()) {
     parameter.value().copy_(restored_like(file, prefix + parameter.key(), parameter.value()));

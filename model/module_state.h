@@ -5,19 +5,21 @@
 
 #include <string>
 
-#include "smal/safetensors.h"
+#include "smal/tensors/safetensors.h"
 
 namespace q3d::model {
 
 // Appends copies on the CPU, named `prefix` + the module's own name.
-void append_parameters(smal::NamedTensors& state, const std::string& prefix, const torch::nn::Module& module);
+void append_parameters(smal::tensors::NamedTensors& state, const std::string& prefix,
+                       const torch::nn::Module& module);
 
 // Throws std::runtime_error naming the tensor, got and expected, when one is missing or of another shape or
 // dtype; then the module may hold some of the new numbers.
-void restore_parameters(const smal::SafeTensors& file, const std::string& prefix, torch::nn::Module& module);
+void restore_parameters(const smal::tensors::SafeTensors& file, const std::string& prefix,
+                        torch::nn::Module& module);
 
 // file.tensor(name) with the shape and dtype of `like`, on its device. Throws as above.
-torch::Tensor restored_like(const smal::SafeTensors& file, const std::string& name,
+torch::Tensor restored_like(const smal::tensors::SafeTensors& file, const std::string& name,
                             const torch::Tensor& like);
 
 }  // namespace q3d::model

@@ -75,7 +75,7 @@ void AdamW::clip(const torch::Tensor& norm, double largest) {
   for (torch::Tensor& gradient : gradients()) gradient.mul_(scale);
 }
 
-void AdamW::append_state(smal::NamedTensors& state, const std::string& prefix) const {
+void AdamW::append_state(smal::tensors::NamedTensors& state, const std::string& prefix) const {
   const auto append = [&](const std::string& name, const torch::Tensor& tensor) {
     state.emplace_back(prefix + name, tensor.to(torch::kCPU, /*non_blocking=*/false, /*copy=*/true));
   };
@@ -88,7 +88,7 @@ void AdamW::append_state(smal::NamedTensors& state, const std::string& prefix) c
   }
 }
 
-void AdamW::restore_state(const smal::SafeTensors& file, const std::string& prefix) {
+void AdamW::restore_state(const smal::tensors::SafeTensors& file, const std::string& prefix) {
   for (Group& group : groups_) {
     for (Slot& slot : group.slots) {
       slot.first_moment = restored_like(file, prefix + slot.name + ".exp_avg", slot.first_moment);

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "smal/safetensors.h"
+#include "smal/tensors/safetensors.h"
 
 namespace q3d::model {
 
@@ -43,9 +43,9 @@ class AdamW {
   // Scales all gradients by min(1, largest / norm), as torch.nn.utils.clip_grad_norm_ does.
   void clip(const torch::Tensor& norm, double largest);
 
-  void append_state(smal::NamedTensors& state, const std::string& prefix) const;
+  void append_state(smal::tensors::NamedTensors& state, const std::string& prefix) const;
   // Throws std::runtime_error naming the tensor, got and expected.
-  void restore_state(const smal::SafeTensors& file, const std::string& prefix);
+  void restore_state(const smal::tensors::SafeTensors& file, const std::string& prefix);
 
  private:
   struct Slot {

@@ -2,7 +2,7 @@
 
 namespace q3d::model {
 
-void join_means(const std::vector<PartialMean*>& means, const Collective& ranks) {
+void join_means(const std::vector<PartialMean*>& means, const ranks::Collective& ranks) {
   if (ranks.size() == 1) return;
   std::vector<torch::Tensor> counts;
   for (const PartialMean* mean : means) counts.push_back(mean->count);

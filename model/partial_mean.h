@@ -6,7 +6,7 @@
 
 #include <vector>
 
-#include "model/collective.h"
+#include "model/ranks/collective.h"
 
 namespace q3d::model {
 
@@ -20,6 +20,6 @@ struct PartialMean {
 
 // Makes each count that of all ranks and scales the sums by their number, so that the mean over the ranks of
 // value() is the joint batch's. The counts must share dtype and device.
-void join_means(const std::vector<PartialMean*>& means, const Collective& ranks);
+void join_means(const std::vector<PartialMean*>& means, const ranks::Collective& ranks);
 
 }  // namespace q3d::model

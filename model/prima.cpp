@@ -8,8 +8,8 @@
 #include "model/assemble.h"
 #include "model/checkpoint.h"
 #include "model/net.h"
-#include "smal/asset.h"
-#include "smal/safetensors.h"
+#include "smal/tensors/asset.h"
+#include "smal/tensors/safetensors.h"
 
 namespace q3d::model {
 namespace {
@@ -35,7 +35,7 @@ void require_crops(const char* name, const torch::Tensor& crops, torch::ScalarTy
 
 }  // namespace
 
-Prima::Prima(std::shared_ptr<PrimaNet> net, smal::SmalBody body)
+Prima::Prima(std::shared_ptr<PrimaNet> net, smal::tensors::SmalBody body)
     : net_(std::move(net)), body_(std::move(body)) {
   const torch::Device net_device = net_->parameters().front().device();
   if (net_device != body_.device()) {
@@ -50,12 +50,12 @@ Prima Prima::load(const std::filesystem::path& checkpoint, const std::filesystem
     throw std::invalid_argument(
         fmt::format("network dtype {} is not float32 or bfloat16", torch::toString(dtype)));
   }
-  const smal::SmalAsset asset = smal::load_asset(smal_asset);
-  const smal::SafeTensors file = smal::SafeTensors::open(checkpoint);
+  const smal::tensors::SmalAsset asset = smal::tensors::load_asset(smal_asset);
+  const smal::tensors::SafeTensors file = smal::tensors::SafeTensors::open(checkpoint);
   auto net = load_net(file, checkpoint_config(file), asset, {device, dtype});
   net->eval();
   for (auto& parameter : net->parameters()) parameter.set_requires_grad(false);
-  return {std::move(net), smal::SmalBody(asset, device)};
+  return {std::move(net), smal::tensors::SmalBody(asset, device)};
 }
 
 torch::Tensor Prima::normalise(const torch::Tensor& crops_u8) const {

@@ -9,7 +9,7 @@
 #include <memory>
 
 #include "model/config.h"
-#include "smal/body.h"
+#include "smal/tensors/body.h"
 
 namespace q3d::model {
 
@@ -49,7 +49,7 @@ class Prima {
   static Prima load(const std::filesystem::path& checkpoint, const std::filesystem::path& smal_asset,
                     torch::Device device, torch::ScalarType dtype = torch::kFloat32);
   // Takes the net as it is. Throws std::invalid_argument when it and the body are on different devices.
-  Prima(std::shared_ptr<PrimaNet> net, smal::SmalBody body);
+  Prima(std::shared_ptr<PrimaNet> net, smal::tensors::SmalBody body);
 
   // crops (B, 3, 256, 256) uint8 RGB (any device) -> normalised float input on the network's device.
   torch::Tensor normalise(const torch::Tensor& crops_u8) const;
@@ -59,13 +59,13 @@ class Prima {
   // All three throw std::invalid_argument naming the tensor, got and expected, and record no gradients.
 
   const PrimaConfig& config() const;
-  const smal::SmalBody& body() const { return body_; }
+  const smal::tensors::SmalBody& body() const { return body_; }
   PrimaNet& net() const { return *net_; }
   torch::Device device() const { return body_.device(); }
 
  private:
   std::shared_ptr<PrimaNet> net_;
-  smal::SmalBody body_;
+  smal::tensors::SmalBody body_;
 };
 
 // A seeded checkpoint of the given sizes: every tensor of the network under its official name (CLIP's text

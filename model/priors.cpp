@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "model/decoder.h"
-#include "smal/synthetic_prior.h"
 
 namespace q3d::model {
 namespace {
@@ -25,7 +24,7 @@ std::string shape_text(at::IntArrayRef shape) {
   return fmt::format("[{}]", fmt::join(shape, ", "));
 }
 
-torch::Tensor read(const smal::SafeTensors& file, const std::string& name,
+torch::Tensor read(const smal::tensors::SafeTensors& file, const std::string& name,
                    const std::vector<std::int64_t>& shape, torch::Device device) {
   const torch::Tensor stored = file.tensor(name);
   if (stored.sizes() != at::IntArrayRef(shape)) {
@@ -42,7 +41,7 @@ torch::Tensor read(const smal::SafeTensors& file, const std::string& name,
 
 }  // namespace
 
-Priors load_priors(const smal::SafeTensors& file, torch::Device device) {
+Priors load_priors(const smal::tensors::SafeTensors& file, torch::Device device) {
   const torch::Tensor stored = file.tensor(kMeanBetas);
   const std::int64_t families = stored.dim() == 2 ? stored.size(0) : 0;
   if (families < 1) {
@@ -59,19 +58,11 @@ Priors load_priors(const smal::SafeTensors& file, torch::Device device) {
 }
 
 void save_priors(const std::filesystem::path& path, const Priors& priors) {
-  smal::write_safetensors(path, {{kMeanPose, priors.mean_pose},
-                                 {kPrecs, priors.precs},
-                                 {kUseIndex, priors.use_index},
-                                 {kBetasPrec, priors.betas_prec},
-                                 {kMeanBetas, priors.mean_betas}});
-}
-
-Priors synthetic_priors() {
-  const smal::PosePrior pose = smal::synthetic_pose_prior();
-  const smal::ShapePrior shape = smal::synthetic_shape_prior();
-  torch::Tensor use_index = torch::ones({kPoseNumbers});
-  use_index.narrow(0, 0, 3).zero_();
-  return {pose.mean, pose.precs, use_index, shape.means, shape.precs};
+  smal::tensors::write_safetensors(path, {{kMeanPose, priors.mean_pose},
+                                          {kPrecs, priors.precs},
+                                          {kUseIndex, priors.use_index},
+                                          {kBetasPrec, priors.betas_prec},
+                                          {kMeanBetas, priors.mean_betas}});
 }
 
 PartialMean pose_prior(const Priors& priors, const torch::Tensor& pose, const torch::Tensor& has_pose) {

@@ -7,7 +7,7 @@
 #include <filesystem>
 
 #include "model/partial_mean.h"
-#include "smal/safetensors.h"
+#include "smal/tensors/safetensors.h"
 
 namespace q3d::model {
 
@@ -21,12 +21,9 @@ struct Priors {
 
 // Reads pose_prior_loss.* and shape_prior_loss.* of a checkpoint or of a file of priors. Throws
 // std::runtime_error naming the tensor, got and expected.
-Priors load_priors(const smal::SafeTensors& file, torch::Device device);
+Priors load_priors(const smal::tensors::SafeTensors& file, torch::Device device);
 // Writes such a file. Throws std::runtime_error.
 void save_priors(const std::filesystem::path& path, const Priors& priors);
-
-// Of the synthetic quadruped (smal/synthetic_prior.h).
-Priors synthetic_priors();
 
 // Mean square of the whitened pose over samples without true pose, the three numbers of the global
 // orientation counted as zeros. pose (B, 105) rad, has_pose (B) of 0 and 1.

@@ -64,8 +64,8 @@ void check_batch(const TrainingBatch& batch, const Priors& priors) {
 
 }  // namespace
 
-Trainer::Trainer(std::shared_ptr<PrimaNet> net, smal::SmalBody body, Priors priors,
-                 const TrainerOptions& options, std::shared_ptr<const Collective> ranks)
+Trainer::Trainer(std::shared_ptr<PrimaNet> net, smal::tensors::SmalBody body, Priors priors,
+                 const TrainerOptions& options, std::shared_ptr<const ranks::Collective> ranks)
     : net_(std::move(net)),
       body_(std::move(body)),
       priors_(std::move(priors)),
@@ -127,7 +127,7 @@ StepReport Trainer::step(const TrainingBatch& batch) {
 
   std::vector<torch::Tensor> scalars{loss, norm};
   for (const auto& [name, term] : named) scalars.push_back(term);
-  const std::vector<double> values = mean_over_ranks(*ranks_, to_host(scalars));
+  const std::vector<double> values = ranks::mean_over_ranks(*ranks_, to_host(scalars));
   StepReport report;
   report.loss = values[0];
   report.gradient_norm = values[1];
@@ -139,7 +139,7 @@ StepReport Trainer::step(const TrainingBatch& batch) {
   optimiser_.step(report.learning_rate);
   if (discriminator_) {
     const torch::Tensor own = step_discriminator(prediction, targets, report.learning_rate);
-    report.terms.emplace_back("discriminator", mean_over_ranks(*ranks_, {own.item<double>()}).front());
+    report.terms.emplace_back("discriminator", ranks::mean_over_ranks(*ranks_, {own.item<double>()}).front());
   }
   ++steps_;
   report.applied = true;
@@ -162,8 +162,8 @@ torch::Tensor Trainer::step_discriminator(const Prediction& prediction, const Ta
   return loss.detach();
 }
 
-smal::NamedTensors Trainer::state() const {
-  smal::NamedTensors state;
+smal::tensors::NamedTensors Trainer::state() const {
+  smal::tensors::NamedTensors state;
   append_parameters(state, "", *net_);
   optimiser_.append_state(state, kOptimiser);
   if (discriminator_) {
@@ -174,7 +174,7 @@ smal::NamedTensors Trainer::state() const {
   return state;
 }
 
-void Trainer::restore(const smal::SafeTensors& file) {
+void Trainer::restore(const smal::tensors::SafeTensors& file) {
   restore_parameters(file, "", *net_);
   optimiser_.restore_state(file, kOptimiser);
   if (discriminator_) {

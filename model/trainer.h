@@ -8,13 +8,13 @@
 #include <memory>
 #include <optional>
 
-#include "model/collective.h"
 #include "model/discriminator.h"
 #include "model/learner.h"
 #include "model/net.h"
 #include "model/optimiser.h"
 #include "model/priors.h"
-#include "smal/body.h"
+#include "model/ranks/collective.h"
+#include "smal/tensors/body.h"
 
 namespace q3d::model {
 
@@ -35,8 +35,9 @@ class Trainer : public Learner {
   // Switches the net to training mode and gives gradients to what learns. Net, body and priors must be on one
   // device. Of several ranks all must start with the same weights. Throws std::invalid_argument otherwise, or
   // when the net does not hold float32.
-  Trainer(std::shared_ptr<PrimaNet> net, smal::SmalBody body, Priors priors, const TrainerOptions& options,
-          std::shared_ptr<const Collective> ranks = single_rank());
+  Trainer(std::shared_ptr<PrimaNet> net, smal::tensors::SmalBody body, Priors priors,
+          const TrainerOptions& options,
+          std::shared_ptr<const ranks::Collective> ranks = ranks::single_rank());
 
   // A family that the priors lack is refused.
   StepReport step(const TrainingBatch& batch) override;
@@ -44,8 +45,8 @@ class Trainer : public Learner {
   std::int64_t steps() const { return steps_; }
   PrimaNet& net() const override { return *net_; }
 
-  smal::NamedTensors state() const override;
-  void restore(const smal::SafeTensors& file) override;
+  smal::tensors::NamedTensors state() const override;
+  void restore(const smal::tensors::SafeTensors& file) override;
 
  private:
   Prediction predict(const torch::Tensor& images) const;
@@ -53,15 +54,15 @@ class Trainer : public Learner {
                                    double learning_rate);
 
   std::shared_ptr<PrimaNet> net_;
-  smal::SmalBody body_;
+  smal::tensors::SmalBody body_;
   Priors priors_;
   TrainerOptions options_;
-  std::shared_ptr<const Collective> ranks_;
+  std::shared_ptr<const ranks::Collective> ranks_;
   AdamW optimiser_;
-  std::unique_ptr<AveragedBackward> backward_;
+  std::unique_ptr<ranks::AveragedBackward> backward_;
   std::shared_ptr<Discriminator> discriminator_;  // null without the adversarial loss
   std::optional<AdamW> discriminator_optimiser_;
-  std::unique_ptr<AveragedBackward> discriminator_backward_;
+  std::unique_ptr<ranks::AveragedBackward> discriminator_backward_;
   std::int64_t steps_ = 0;
 };
 

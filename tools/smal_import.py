@@ -1,5 +1,5 @@
 """The official SMAL pickles (Python 2, with chumpy and scipy objects) -> plain safetensors files: the body model as
-smal/asset.h describes it, and the shape and pose priors under their names in the official checkpoint.
+smal/tensors/asset.h describes it, and the shape and pose priors under their names in the official checkpoint.
 """
 
 from __future__ import annotations

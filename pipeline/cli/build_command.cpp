@@ -6,9 +6,9 @@
 #include <memory>
 
 #include "manifests/atomic_file.h"
-#include "pipeline/build.h"
+#include "pipeline/build/build.h"
 #include "pipeline/cli/commands.h"
-#include "pipeline/progress.h"
+#include "pipeline/run/progress.h"
 
 namespace q3d::pipeline::cli {
 namespace {
@@ -16,7 +16,7 @@ namespace {
 struct Arguments {
   std::vector<std::filesystem::path> configs;
   std::filesystem::path veto;
-  RunOptions run;
+  run::RunOptions run;
   bool json = false;
 };
 
@@ -24,13 +24,13 @@ double percent(std::int64_t part, std::int64_t whole) {
   return whole == 0 ? 0.0 : 100.0 * static_cast<double>(part) / static_cast<double>(whole);
 }
 
-void print_summary(const BuildSummary& summary) {
-  const Counts& counts = summary.dataset.counts;
+void print_summary(const build::BuildSummary& summary) {
+  const dataset::Counts& counts = summary.dataset.counts;
   const auto line = [&](const char* name, std::int64_t count) {
     fmt::print(stderr, "  {:<10} {:>8}  {:5.1f} %\n", name, count, percent(count, counts.candidates));
   };
   fmt::print(stderr, "\n{} {} in {}\n", summary.dataset.name,
-             summary.was_up_to_date ? "was up to date" : "built", human_duration(summary.seconds));
+             summary.was_up_to_date ? "was up to date" : "built", run::human_duration(summary.seconds));
   fmt::print(stderr, "  {:<10} {:>8}\n", "candidates", counts.candidates);
   line("retained", counts.retained);
   line("refined", counts.refined);
@@ -48,8 +48,8 @@ void print_summary(const BuildSummary& summary) {
              summary.folder.string());
 }
 
-nlohmann::ordered_json to_json(const BuildSummary& summary) {
-  const Counts& counts = summary.dataset.counts;
+nlohmann::ordered_json to_json(const build::BuildSummary& summary) {
+  const dataset::Counts& counts = summary.dataset.counts;
   return {{"candidates", counts.candidates},
           {"retained", counts.retained},
           {"refined", counts.refined},
@@ -65,8 +65,8 @@ nlohmann::ordered_json to_json(const BuildSummary& summary) {
 }
 
 // The veto of the command line stands over the config's.
-BuildConfig configured(const Arguments& arguments) {
-  BuildConfig config = load_build_config(arguments.configs);
+config::BuildConfig configured(const Arguments& arguments) {
+  config::BuildConfig config = config::load_build_config(arguments.configs);
   if (arguments.veto.empty()) return config;
   config.veto = std::filesystem::absolute(arguments.veto);
   config.as_written["veto"] = arguments.veto.string();
@@ -104,7 +104,7 @@ Command add_build(CLI::App& app) {
       "\"truth\" or\n"
       "\"2d_only\" bring their labels: they need neither thresholds nor a network (docs/config.md).");
   return [arguments] {
-    const BuildSummary summary = build(configured(*arguments), arguments->run);
+    const build::BuildSummary summary = build::build(configured(*arguments), arguments->run);
     print_summary(summary);
     if (arguments->json) fmt::print("{}\n", to_json(summary).dump());
     return 0;

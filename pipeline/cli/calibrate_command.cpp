@@ -6,27 +6,27 @@
 #include <memory>
 
 #include "manifests/atomic_file.h"
-#include "pipeline/calibrate_run.h"
-#include "pipeline/calibration_figure.h"
+#include "pipeline/build/calibrate_run.h"
 #include "pipeline/cli/commands.h"
-#include "pipeline/progress.h"
+#include "pipeline/report/calibration_figure.h"
+#include "pipeline/run/progress.h"
 
 namespace q3d::pipeline::cli {
 namespace {
 
 struct Arguments {
   std::vector<std::filesystem::path> configs;
-  RunOptions run;
+  run::RunOptions run;
   std::filesystem::path write;
   std::filesystem::path figure;
   bool json = false;
 };
 
-void print_pool(const CalibratedPool& pool) {
+void print_pool(const build::CalibratedPool& pool) {
   const filters::Calibration& result = pool.calibration;
   fmt::print(stderr, "\n{}: {} candidates have a prediction, {} were adapted\n",
              pool.dataset.empty() ? "all datasets" : pool.dataset, pool.judged, pool.adapted);
-  fmt::print(stderr, "{}", calibration_table(pool));
+  fmt::print(stderr, "{}", report::calibration_table(pool));
   fmt::print(stderr, "  retained {:.1f} %, refined {:.1f} %, discarded {:.1f} %\n", 100 * result.retained,
              100 * result.refined, 100 * (1 - result.retained - result.refined));
   if (!result.reached) {
@@ -38,12 +38,12 @@ void print_pool(const CalibratedPool& pool) {
   }
 }
 
-void print_summary(const CalibrationSummary& summary, const Arguments& arguments) {
+void print_summary(const build::CalibrationSummary& summary, const Arguments& arguments) {
   fmt::print(stderr, "\ncalibrated on {} candidates in {}\n", summary.candidates,
-             human_duration(summary.seconds));
-  for (const CalibratedPool& pool : summary.pools) print_pool(pool);
+             run::human_duration(summary.seconds));
+  for (const build::CalibratedPool& pool : summary.pools) print_pool(pool);
   fmt::print(stderr, "\n");
-  fmt::print("{}", thresholds_layer(summary));
+  fmt::print("{}", build::thresholds_layer(summary));
   if (!arguments.figure.empty()) fmt::print(stderr, "wrote {}\n", arguments.figure.string());
   if (!arguments.write.empty()) {
     fmt::print(stderr, "next: quadruped3d build --config <the same> --config {} --out <the same>\n",
@@ -51,11 +51,11 @@ void print_summary(const CalibrationSummary& summary, const Arguments& arguments
   }
 }
 
-nlohmann::ordered_json to_json(const CalibrationSummary& summary) {
+nlohmann::ordered_json to_json(const build::CalibrationSummary& summary) {
   nlohmann::ordered_json pools = nlohmann::ordered_json::array();
   std::int64_t judged = 0;
   std::int64_t adapted = 0;
-  for (const CalibratedPool& pool : summary.pools) {
+  for (const build::CalibratedPool& pool : summary.pools) {
     judged += pool.judged;
     adapted += pool.adapted;
     const filters::Calibration& result = pool.calibration;
@@ -113,10 +113,11 @@ Command add_calibrate(CLI::App& app) {
       "true every\ndataset gets thresholds of its own. Guards that bound labels act after this: they lower "
       "the shares.");
   return [arguments] {
-    const CalibrationSummary summary = calibrate(load_build_config(arguments->configs), arguments->run);
-    if (!arguments->write.empty()) write_thresholds(arguments->write, summary);
+    const build::CalibrationSummary summary =
+        build::calibrate(config::load_build_config(arguments->configs), arguments->run);
+    if (!arguments->write.empty()) build::write_thresholds(arguments->write, summary);
     if (!arguments->figure.empty()) {
-      manifests::write_file_atomically(arguments->figure, calibration_figure(summary));
+      manifests::write_file_atomically(arguments->figure, report::calibration_figure(summary));
     }
     if (arguments->json) {
       fmt::print("{}\n", to_json(summary).dump());

@@ -6,8 +6,8 @@
 
 #include "manifests/atomic_file.h"
 #include "pipeline/cli/commands.h"
-#include "pipeline/errors.h"
 #include "pipeline/evaluation/compare.h"
+#include "pipeline/run/errors.h"
 
 namespace q3d::pipeline::cli {
 namespace {
@@ -33,7 +33,7 @@ int run(const Arguments& arguments) {
   try {
     comparison = evaluation::compare(before, after, arguments.options);
   } catch (const std::invalid_argument& error) {
-    throw ConfigError(std::string("compare: ") + error.what());
+    throw run::ConfigError(std::string("compare: ") + error.what());
   }
   const nlohmann::ordered_json document = evaluation::to_json(comparison, before, after);
   if (!arguments.out.empty()) manifests::write_file_atomically(arguments.out, document.dump(2) + "\n");

@@ -6,8 +6,8 @@
 
 #include "manifests/atomic_file.h"
 #include "pipeline/cli/commands.h"
-#include "pipeline/errors.h"
 #include "pipeline/evaluation/compare_labels.h"
+#include "pipeline/run/errors.h"
 
 namespace q3d::pipeline::cli {
 namespace {
@@ -33,7 +33,7 @@ int run(const Arguments& arguments) {
   try {
     comparison = evaluation::compare_labels(before, after, arguments.bootstrap);
   } catch (const std::invalid_argument& error) {
-    throw ConfigError(std::string("compare-labels: ") + error.what());
+    throw run::ConfigError(std::string("compare-labels: ") + error.what());
   }
   const nlohmann::ordered_json document = evaluation::to_json(comparison, before, after);
   if (!arguments.out.empty()) manifests::write_file_atomically(arguments.out, document.dump(2) + "\n");

@@ -4,8 +4,8 @@
 #include <memory>
 
 #include "pipeline/cli/commands.h"
-#include "pipeline/effective_config.h"
-#include "pipeline/profiles.h"
+#include "pipeline/config/effective_config.h"
+#include "pipeline/config/profiles.h"
 
 namespace q3d::pipeline::cli {
 namespace {
@@ -17,10 +17,11 @@ struct Arguments {
 int show(const Arguments& arguments) {
   nlohmann::ordered_json document;
   if (arguments.configs.empty()) {
-    for (const std::string& name : profile_names()) document["profiles"][name] = profile_layer(name);
+    for (const std::string& name : config::profile_names())
+      document["profiles"][name] = config::profile_layer(name);
     fmt::print(stderr, "the profiles; with --config, a whole config with its profile expanded\n");
   } else {
-    document = effective_config(load_build_config(arguments.configs));
+    document = config::effective_config(config::load_build_config(arguments.configs));
   }
   fmt::print("{}\n", document.dump(2));
   return 0;

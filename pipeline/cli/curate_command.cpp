@@ -6,7 +6,7 @@
 #include <memory>
 
 #include "pipeline/cli/commands.h"
-#include "pipeline/curate_run.h"
+#include "pipeline/curation/curate_run.h"
 
 namespace q3d::pipeline::cli {
 namespace {
@@ -22,7 +22,7 @@ std::int64_t count_of(const std::map<std::string, std::int64_t>& counts, const s
   return found == counts.end() ? 0 : found->second;
 }
 
-void print_species(const CurationSummary& summary) {
+void print_species(const curation::CurationSummary& summary) {
   fmt::print(stderr, "\n  {:<24}", "chosen of available");
   for (const auto& [split, verdicts] : summary.verdicts) fmt::print(stderr, "{:>18}", split);
   fmt::print(stderr, "\n");
@@ -37,7 +37,7 @@ void print_species(const CurationSummary& summary) {
   }
 }
 
-void print_summary(const CurationSummary& summary) {
+void print_summary(const curation::CurationSummary& summary) {
   for (const std::string& note : summary.notes) fmt::print(stderr, "note: {}\n", note);
   print_species(summary);
   for (const auto& [split, verdicts] : summary.verdicts) {
@@ -69,7 +69,8 @@ Command add_curate(CLI::App& app) {
       "rule, the\n"
       "digests of what was read, and all counts.");
   return [arguments] {
-    const CurationSummary summary = run_curate(load_curation_config(arguments->configs), arguments->out);
+    const curation::CurationSummary summary =
+        curation::run_curate(curation::load_curation_config(arguments->configs), arguments->out);
     print_summary(summary);
     if (arguments->json) {
       const nlohmann::ordered_json document = {{"list", summary.list.string()},

@@ -7,7 +7,7 @@
 
 #include "pipeline/cli/commands.h"
 #include "pipeline/evaluation/report.h"
-#include "pipeline/progress.h"
+#include "pipeline/run/progress.h"
 
 namespace q3d::pipeline::cli {
 namespace {
@@ -32,7 +32,7 @@ int run(const Arguments& arguments) {
   }
   std::FILE* const people = arguments.json ? stderr : stdout;
   fmt::print(people, "\n{} (sha256 {}...) on {}, in {}\n\n{}", result.checkpoint,
-             result.checkpoint_sha256.substr(0, 12), result.device, human_duration(result.seconds),
+             result.checkpoint_sha256.substr(0, 12), result.device, run::human_duration(result.seconds),
              evaluation::summary_text(result, tables, arguments.species));
   fmt::print(people, "every sample: {}\nnext: quadruped3d compare --before {} --after <another evaluation>\n",
              (arguments.out / "samples.csv").string(), arguments.out.string());

@@ -18,7 +18,7 @@ struct Arguments {
 
 int run(const Arguments& arguments) {
   const evaluation::LabelEvaluation result =
-      evaluation::evaluate_labels(load_build_config(arguments.configs), arguments.options);
+      evaluation::evaluate_labels(config::load_build_config(arguments.configs), arguments.options);
   if (!arguments.report.empty()) evaluation::write_label_evaluation(arguments.report, result);
   std::FILE* const people = arguments.json ? stderr : stdout;
   fmt::print(people, "\n{}\n{}", result.dataset, evaluation::summary_text(result));

@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "pipeline/cli/commands.h"
-#include "pipeline/explain.h"
+#include "pipeline/dataset/explain.h"
 
 namespace q3d::pipeline::cli {
 namespace {
@@ -39,8 +39,8 @@ Command add_explain(CLI::App& app) {
       "less.\n"
       "To leave a sample out of the next build, put its id on a line of a file: build --veto FILE.");
   return [arguments] {
-    const nlohmann::ordered_json story = explain(arguments->dataset, arguments->sample);
-    fmt::print("{}", arguments->json ? story.dump() + "\n" : tell(story));
+    const nlohmann::ordered_json story = dataset::explain(arguments->dataset, arguments->sample);
+    fmt::print("{}", arguments->json ? story.dump() + "\n" : dataset::tell(story));
     return 0;
   };
 }

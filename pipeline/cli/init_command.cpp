@@ -5,9 +5,10 @@
 #include <cstdio>
 #include <memory>
 
+#include "pipeline/animal/synthetic_files.h"
 #include "pipeline/cli/commands.h"
-#include "pipeline/errors.h"
-#include "pipeline/network.h"
+#include "pipeline/network/torch_network.h"
+#include "pipeline/run/errors.h"
 
 namespace q3d::pipeline::cli {
 namespace {
@@ -46,23 +47,23 @@ Command add_init(CLI::App& app) {
       "be redistributed; the synthetic quadruped has its dimensions.");
   return [arguments] {
     if (arguments->out.empty() && arguments->asset.empty() && arguments->priors.empty()) {
-      throw ConfigError(
+      throw run::ConfigError(
           "init: give at least one of --out (a checkpoint), --smal-asset (the body) and --priors");
     }
     nlohmann::ordered_json document = nlohmann::ordered_json::object();
     if (!arguments->out.empty()) {
-      write_initial_checkpoint(arguments->out, arguments->size, arguments->seed);
+      network::write_initial_checkpoint(arguments->out, arguments->size, arguments->seed);
       fmt::print(stderr, "wrote {} ({}, seed {})\n", arguments->out.string(), arguments->size,
                  arguments->seed);
       document["checkpoint"] = arguments->out.string();
     }
     if (!arguments->asset.empty()) {
-      write_synthetic_asset(arguments->asset);
+      animal::write_synthetic_asset(arguments->asset);
       fmt::print(stderr, "wrote {}\n", arguments->asset.string());
       document["smal_asset"] = arguments->asset.string();
     }
     if (!arguments->priors.empty()) {
-      write_synthetic_priors(arguments->priors);
+      animal::write_synthetic_priors(arguments->priors);
       fmt::print(stderr, "wrote {}\n", arguments->priors.string());
       document["priors"] = arguments->priors.string();
     }

@@ -6,8 +6,8 @@
 #include <memory>
 
 #include "pipeline/cli/commands.h"
-#include "pipeline/contact_sheet.h"
-#include "pipeline/inspect.h"
+#include "pipeline/dataset/inspect.h"
+#include "pipeline/report/contact_sheet.h"
 
 namespace q3d::pipeline::cli {
 namespace {
@@ -44,13 +44,14 @@ Command add_inspect(CLI::App& app) {
       "On the sheet, green discs are the annotated keypoints and red crosses the labelled body's.");
   return [arguments] {
     if (!arguments->sheet.empty()) {
-      write_contact_sheet(arguments->sheet, spread_samples(arguments->path, arguments->count));
+      report::write_contact_sheet(arguments->sheet,
+                                  dataset::spread_samples(arguments->path, arguments->count));
       fmt::print(stderr, "wrote {}\n", arguments->sheet.string());
       return 0;
     }
-    const nlohmann::ordered_json document = arguments->sample.empty()
-                                                ? describe(arguments->path)
-                                                : describe_sample(arguments->path, arguments->sample);
+    const nlohmann::ordered_json document =
+        arguments->sample.empty() ? dataset::describe(arguments->path)
+                                  : dataset::describe_sample(arguments->path, arguments->sample);
     fmt::print("{}\n", document.dump(arguments->json ? -1 : 2));
     return 0;
   };

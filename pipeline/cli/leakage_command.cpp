@@ -6,29 +6,29 @@
 #include <memory>
 
 #include "pipeline/cli/commands.h"
-#include "pipeline/leakage_run.h"
-#include "pipeline/progress.h"
+#include "pipeline/leakage/leakage_run.h"
+#include "pipeline/run/progress.h"
 
 namespace q3d::pipeline::cli {
 namespace {
 
 struct Arguments {
   std::vector<std::filesystem::path> configs;
-  RunOptions run;
+  run::RunOptions run;
   bool json = false;
 };
 
-std::size_t count_leaks(const LeakageRunSummary& summary) {
+std::size_t count_leaks(const leakage::LeakageRunSummary& summary) {
   std::size_t count = 0;
   for (const auto& [evidence, leaks] : summary.leaks_by_evidence) count += leaks;
   return count;
 }
 
-void print_summary(const LeakageRunSummary& summary, const std::filesystem::path& out) {
+void print_summary(const leakage::LeakageRunSummary& summary, const std::filesystem::path& out) {
   for (const std::string& note : summary.notes) fmt::print(stderr, "note: {}\n", note);
   fmt::print(stderr, "\n{} pictures of {} candidates compared with {} test pictures in {}\n",
              summary.pool_pictures, summary.candidates, summary.test_pictures,
-             human_duration(summary.seconds));
+             run::human_duration(summary.seconds));
   fmt::print(stderr, "  candidates whose picture is in a test set: {}\n", count_leaks(summary));
   for (const auto& [evidence, leaks] : summary.leaks_by_evidence) {
     fmt::print(stderr, "    {:<12} {}\n", evidence, leaks);
@@ -73,7 +73,8 @@ Command add_leakage(CLI::App& app) {
       "mirrored; not cut out). Hashes are kept in the folder: give the build's own, and it finds them "
       "there.");
   return [arguments] {
-    const LeakageRunSummary summary = run_leakage(load_build_config(arguments->configs), arguments->run);
+    const leakage::LeakageRunSummary summary =
+        leakage::run_leakage(config::load_build_config(arguments->configs), arguments->run);
     print_summary(summary, arguments->run.out);
     if (arguments->json) {
       const nlohmann::ordered_json document = {{"candidates", summary.candidates},

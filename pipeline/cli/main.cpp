@@ -11,8 +11,9 @@
 #include <vector>
 
 #include "pipeline/cli/commands.h"
-#include "pipeline/errors.h"
-#include "pipeline/interrupt.h"
+#include "pipeline/run/errors.h"
+#include "pipeline/run/interrupt.h"
+#include "pipeline/run/version.h"
 
 namespace {
 
@@ -27,7 +28,7 @@ int run(int argc, char** argv) {
       "of quadrupeds,\nwith a verdict and a provenance for every one of them."};
   app.name("quadruped3d");
   app.require_subcommand(1);
-  app.set_version_flag("--version", "quadruped3d " Q3D_VERSION);
+  app.set_version_flag("--version", "quadruped3d " + std::string(run::version()));
   app.footer(
       "First steps:\n"
       "  quadruped3d sample --out data/world                 make pictures to try it on\n"
@@ -68,13 +69,13 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   cv::setNumThreads(1);  // the flow graph's threads are the only ones
-  q3d::pipeline::install_interrupt_handlers();
+  q3d::pipeline::run::install_interrupt_handlers();
   try {
     return run(argc, argv);
-  } catch (const q3d::pipeline::Interrupted&) {
+  } catch (const q3d::pipeline::run::Interrupted&) {
     fmt::print(stderr, "stopped; run the same command to go on where it left off\n");
     return kInterrupted;
-  } catch (const q3d::pipeline::ConfigError& error) {
+  } catch (const q3d::pipeline::run::ConfigError& error) {
     fmt::print(stderr, "quadruped3d: {}\n", error.what());
     return kUsage;
   } catch (const std::bad_alloc&) {

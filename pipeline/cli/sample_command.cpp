@@ -6,8 +6,8 @@
 #include <memory>
 
 #include "pipeline/cli/commands.h"
-#include "pipeline/interrupt.h"
-#include "pipeline/progress.h"
+#include "pipeline/run/interrupt.h"
+#include "pipeline/run/progress.h"
 #include "pipeline/world/world.h"
 
 namespace q3d::pipeline::cli {
@@ -43,11 +43,11 @@ Command add_sample(CLI::App& app) {
       "the hidden truth of the 2D-only sets in truth/, and the synthetic SMAL asset in assets/.");
   return [arguments] {
     world::WorldOptions& wanted = arguments->world;
-    std::unique_ptr<Progress> progress;
+    std::unique_ptr<run::Progress> progress;
     int shown = 0;
     wanted.progress = [&](int done, int total) {
-      throw_if_interrupted();
-      if (!progress) progress = std::make_unique<Progress>("pictures", total, arguments->quiet);
+      run::throw_if_interrupted();
+      if (!progress) progress = std::make_unique<run::Progress>("pictures", total, arguments->quiet);
       progress->advance(done - shown);
       shown = done;
     };

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/cli/commands.h"
-#include "pipeline/progress.h"
+#include "pipeline/run/progress.h"
 #include "pipeline/training/training_run.h"
 
 namespace q3d::pipeline::cli {
@@ -14,13 +14,13 @@ namespace {
 struct Arguments {
   std::vector<std::filesystem::path> configs;
   std::string stage;
-  TrainingOptions options;
+  training::TrainingOptions options;
   bool json = false;
 };
 
-void print_summary(const TrainingSummary& summary) {
+void print_summary(const training::TrainingSummary& summary) {
   fmt::print(stderr, "\n{} of {} steps done, {} of them now, in {}\n", summary.steps_done,
-             summary.steps_total, summary.steps_here, human_duration(summary.seconds));
+             summary.steps_total, summary.steps_here, run::human_duration(summary.seconds));
   if (summary.finished) {
     fmt::print(stderr, "  weights: {}\n", summary.model.string());
   } else {
@@ -28,7 +28,7 @@ void print_summary(const TrainingSummary& summary) {
   }
 }
 
-nlohmann::ordered_json to_json(const TrainingSummary& summary) {
+nlohmann::ordered_json to_json(const training::TrainingSummary& summary) {
   return {{"steps_done", summary.steps_done}, {"steps_total", summary.steps_total},
           {"steps_here", summary.steps_here}, {"finished", summary.finished},
           {"last_loss", summary.last_loss},   {"model", summary.model.string()},
@@ -65,8 +65,8 @@ Command add_train(CLI::App& app) {
       "weights that\n"
       "it would have had anyway. docs/training.md describes the config, the log and the state.");
   return [arguments] {
-    const TrainingSummary summary =
-        train(load_training_config(arguments->configs, arguments->stage), arguments->options);
+    const training::TrainingSummary summary = training::train(
+        training::load_training_config(arguments->configs, arguments->stage), arguments->options);
     if (summary.rank != 0) return 0;  // rank 0 speaks for all
     print_summary(summary);
     if (arguments->json) fmt::print("{}\n", to_json(summary).dump());

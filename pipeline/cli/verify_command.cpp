@@ -6,7 +6,7 @@
 #include <memory>
 
 #include "pipeline/cli/commands.h"
-#include "pipeline/verify.h"
+#include "pipeline/dataset/verify.h"
 
 namespace q3d::pipeline::cli {
 namespace {
@@ -33,7 +33,7 @@ Command add_verify(CLI::App& app) {
       "  quadruped3d verify out/quadruped3d-0123456789ab --json\n"
       "Exit code 0: sound. 1: something is wrong; every problem is listed.");
   return [arguments] {
-    const VerifySummary summary = verify(arguments->dataset, arguments->quiet);
+    const dataset::VerifySummary summary = dataset::verify(arguments->dataset, arguments->quiet);
     for (const std::string& problem : summary.problems) fmt::print(stderr, "problem: {}\n", problem);
     const bool sound = summary.problems.empty();
     fmt::print(stderr, "{}: {} shards, {} samples, {} pictures read: {}\n", summary.folder.string(),

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "pipeline/evaluation/text_table.h"
+#include "pipeline/run/version.h"
 
 namespace q3d::pipeline::evaluation {
 namespace {
@@ -274,7 +275,7 @@ nlohmann::ordered_json to_json(const Comparison& comparison, const std::vector<S
   const filters::BootstrapOptions& bootstrap = comparison.options.bootstrap;
   return {{"format", "quadruped3d-comparison"},
           {"schema", 1},
-          {"toolkit", Q3D_VERSION},
+          {"toolkit", run::version()},
           {"before", sides(before)},
           {"after", sides(after)},
           {"pairs", comparison.pairs},

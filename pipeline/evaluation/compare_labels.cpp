@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "pipeline/evaluation/text_table.h"
+#include "pipeline/run/version.h"
 
 namespace q3d::pipeline::evaluation {
 namespace {
@@ -202,7 +203,7 @@ nlohmann::ordered_json to_json(const LabelComparison& comparison, const std::vec
   }
   return {{"format", "quadruped3d-label-comparison"},
           {"schema", 1},
-          {"toolkit", Q3D_VERSION},
+          {"toolkit", run::version()},
           {"pairs", std::move(pairs)},
           {"resamples", comparison.bootstrap.resamples},
           {"confidence", comparison.bootstrap.confidence},

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <memory>
 
-#include "pipeline/interrupt.h"
-#include "pipeline/unit_flow.h"
-#include "pipeline/unit_steps.h"
+#include "pipeline/run/interrupt.h"
+#include "pipeline/unit/unit_flow.h"
+#include "pipeline/unit/unit_steps.h"
 
 namespace q3d::pipeline::evaluation {
 namespace {
@@ -16,10 +16,10 @@ using manifests::Reason;
 
 constexpr std::size_t kUnitSize = 64;  // batches form inside a unit, so it is part of the numbers' last bits
 
-std::vector<Unit> cut_units(std::size_t candidates) {
-  std::vector<Unit> units;
+std::vector<candidates::Unit> cut_units(std::size_t candidates) {
+  std::vector<candidates::Unit> units;
   for (std::size_t first = 0; first < candidates; first += kUnitSize) {
-    Unit unit;
+    candidates::Unit unit;
     unit.index = static_cast<std::int64_t>(units.size());
     unit.first = first;
     unit.count = std::min(kUnitSize, candidates - first);
@@ -31,15 +31,15 @@ std::vector<Unit> cut_units(std::size_t candidates) {
 // The samples of a unit that have a picture and a finite prediction.
 struct Measurable {
   std::vector<std::size_t> samples;  // into the results
-  std::vector<PatchView> patches;
-  std::vector<BodyPrediction> bodies;
+  std::vector<device::PatchView> patches;
+  std::vector<device::BodyPrediction> bodies;
   std::vector<Target> targets;
 };
 
 class RecordEvaluator {
  public:
   RecordEvaluator(std::vector<manifests::SampleRecord> records, const Instruments& instruments,
-                  Progress& progress)
+                  run::Progress& progress)
       : instruments_(instruments), progress_(progress), results_(records.size()) {
     for (std::size_t i = 0; i < records.size(); ++i) {
       SampleResult& result = results_[i];
@@ -56,43 +56,46 @@ class RecordEvaluator {
   }
 
   std::vector<SampleResult> run() {
-    UnitFlow flow;
+    unit::UnitFlow flow;
     flow.units = static_cast<std::int64_t>(units_.size());
     flow.read = [this](std::int64_t index) {
-      auto work = std::make_shared<UnitWork>();
+      auto work = std::make_shared<unit::UnitWork>();
       work->unit = &units_[static_cast<std::size_t>(index)];
       work->candidates = std::span(candidates_).subspan(work->unit->first, work->unit->count);
       return work;
     };
-    flow.decode = [](UnitWork& work) { decode(work); };
-    flow.compute = [this](UnitWork& work) { compute(work); };
-    flow.write = [this](UnitWork& work) { progress_.advance(static_cast<std::int64_t>(work.unit->count)); };
-    pipeline::run(flow, *instruments_.device);
+    flow.decode = [](unit::UnitWork& work) { decode(work); };
+    flow.compute = [this](unit::UnitWork& work) { compute(work); };
+    flow.write = [this](unit::UnitWork& work) {
+      progress_.advance(static_cast<std::int64_t>(work.unit->count));
+    };
+    unit::run_units(flow, *instruments_.device);
     return std::move(results_);
   }
 
  private:
-  static void decode(UnitWork& work) {
+  static void decode(unit::UnitWork& work) {
     work.decoded.assign(work.candidates.size(), {});
     tbb::parallel_for(std::size_t{0}, work.candidates.size(), [&](std::size_t i) {
       const manifests::SampleRecord& record = work.candidates[i].record;
-      if (interrupted() || record.failure != Reason::none) return;
-      work.decoded[i] = decode_sample(record, {.patch = true, .stored_crop = false, .mask_area = true}, {});
+      if (run::interrupted() || record.failure != Reason::none) return;
+      work.decoded[i] =
+          unit::decode_sample(record, {.patch = true, .stored_crop = false, .mask_area = true}, {});
     });
   }
 
-  void compute(const UnitWork& work) {
+  void compute(const unit::UnitWork& work) {
     Measurable unit = predict(work);
     measure_setting(0, unit.bodies, unit);
     std::size_t setting = 1;
     for (const TtaPass& pass : instruments_.plan->passes) setting = adapt(pass, setting, unit);
   }
 
-  Measurable predict(const UnitWork& work) {
-    std::vector<PatchView> patches;
+  Measurable predict(const unit::UnitWork& work) {
+    std::vector<device::PatchView> patches;
     std::vector<std::size_t> positions;
     for (std::size_t i = 0; i < work.candidates.size(); ++i) {
-      const DecodedSample& decoded = work.decoded[i];
+      const unit::DecodedSample& decoded = work.decoded[i];
       SampleResult& result = results_[work.unit->first + i];
       if (result.failure != Reason::none) continue;
       if (!decoded.detail.empty()) result.detail = decoded.detail;
@@ -101,13 +104,13 @@ class RecordEvaluator {
       patches.emplace_back(decoded.patch);
       positions.push_back(i);
     }
-    const std::vector<BodyPrediction> bodies = instruments_.network->predict(patches);
+    const std::vector<device::BodyPrediction> bodies = instruments_.network->predict(patches);
     Measurable unit;
     std::vector<const manifests::SampleRecord*> records;
     for (std::size_t j = 0; j < bodies.size(); ++j) {
       const std::size_t i = positions[j];
       SampleResult& result = results_[work.unit->first + i];
-      if (!is_finite(bodies[j])) {
+      if (!device::is_finite(bodies[j])) {
         result.failure = Reason::prediction_not_finite;
         result.detail = "the network's output holds NaN or infinity";
         continue;
@@ -128,38 +131,39 @@ class RecordEvaluator {
 
   // Measures what one pass gives; returns the setting after its last.
   std::size_t adapt(const TtaPass& pass, std::size_t setting, const Measurable& unit) {
-    throw_if_interrupted();
-    std::vector<AdaptRequest> requests;
+    run::throw_if_interrupted();
+    std::vector<device::AdaptRequest> requests;
     for (std::size_t j = 0; j < unit.samples.size(); ++j) {
-      AdaptRequest& request = requests.emplace_back();
+      device::AdaptRequest& request = requests.emplace_back();
       request.patch = unit.patches[j];
       request.keypoints = hide_keypoints(unit.targets[j].keypoints, pass.visible_share, instruments_.seed,
                                          results_[unit.samples[j]].id);
       request.iterations = pass.iterations;
     }
-    const std::vector<AdaptOutcome> outcomes = instruments_.network->adapt(requests, pass.iterates);
+    const std::vector<device::AdaptOutcome> outcomes = instruments_.network->adapt(requests, pass.iterates);
     const auto measure_all = [&](auto&& body_of) {
-      std::vector<BodyPrediction> bodies;
-      for (const AdaptOutcome& outcome : outcomes) bodies.push_back(body_of(outcome));
+      std::vector<device::BodyPrediction> bodies;
+      for (const device::AdaptOutcome& outcome : outcomes) bodies.push_back(body_of(outcome));
       measure_setting(setting++, bodies, unit);
     };
-    if (pass.iterates.empty()) measure_all([](const AdaptOutcome& outcome) { return outcome.best; });
+    if (pass.iterates.empty()) measure_all([](const device::AdaptOutcome& outcome) { return outcome.best; });
     for (std::size_t i = 0; i < pass.iterates.size(); ++i) {
-      measure_all([i](const AdaptOutcome& outcome) { return outcome.snapshots[i]; });
+      measure_all([i](const device::AdaptOutcome& outcome) { return outcome.snapshots[i]; });
     }
     return setting;
   }
 
-  void measure_setting(std::size_t setting, std::span<const BodyPrediction> bodies, const Measurable& unit) {
-    std::vector<BodyShape> shapes;
+  void measure_setting(std::size_t setting, std::span<const device::BodyPrediction> bodies,
+                       const Measurable& unit) {
+    std::vector<device::BodyShape> shapes;
     std::vector<std::size_t> with_mesh;
     for (std::size_t j = 0; j < bodies.size(); ++j) {
       if (unit.targets[j].vertices.empty()) continue;
       shapes.push_back({bodies[j].rotations, bodies[j].betas});
       with_mesh.push_back(j);
     }
-    const std::vector<BodyMesh> posed = instruments_.meshes->pose(shapes);
-    std::vector<const BodyMesh*> mesh_of(bodies.size(), nullptr);
+    const std::vector<device::BodyMesh> posed = instruments_.meshes->pose(shapes);
+    std::vector<const device::BodyMesh*> mesh_of(bodies.size(), nullptr);
     for (std::size_t m = 0; m < posed.size(); ++m) mesh_of[with_mesh[m]] = &posed[m];
     for (std::size_t j = 0; j < bodies.size(); ++j) {
       SampleResult& result = results_[unit.samples[j]];
@@ -169,16 +173,16 @@ class RecordEvaluator {
   }
 
   const Instruments& instruments_;
-  Progress& progress_;
-  std::vector<Candidate> candidates_;
-  std::vector<Unit> units_;
+  run::Progress& progress_;
+  std::vector<candidates::Candidate> candidates_;
+  std::vector<candidates::Unit> units_;
   std::vector<SampleResult> results_;  // a unit's own are written on the device's thread alone
 };
 
 }  // namespace
 
 std::vector<SampleResult> evaluate_records(std::vector<manifests::SampleRecord> records,
-                                           const Instruments& instruments, Progress& progress) {
+                                           const Instruments& instruments, run::Progress& progress) {
   return RecordEvaluator(std::move(records), instruments, progress).run();
 }
 

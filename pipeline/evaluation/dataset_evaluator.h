@@ -4,24 +4,24 @@
 #include <functional>
 #include <vector>
 
-#include "pipeline/device_worker.h"
+#include "pipeline/device/device_worker.h"
 #include "pipeline/evaluation/evaluate.h"
-#include "pipeline/progress.h"
+#include "pipeline/run/progress.h"
 
 namespace q3d::pipeline::evaluation {
 
 // What measuring needs and does not change.
 struct Instruments {
   const Plan* plan = nullptr;
-  const BodyMeshes* meshes = nullptr;
-  Network* network = nullptr;  // called on the device's thread only
-  DeviceWorker* device = nullptr;
+  const device::BodyMeshes* meshes = nullptr;
+  device::Network* network = nullptr;  // called on the device's thread only
+  device::DeviceWorker* device = nullptr;
   std::uint64_t seed = 0;
 };
 
 // The records' results, in their order; a record that a loader failed keeps its failure, but for
 // no_visible_keypoints, which has 3D metrics all the same. Throws std::runtime_error, Interrupted.
 std::vector<SampleResult> evaluate_records(std::vector<manifests::SampleRecord> records,
-                                           const Instruments& instruments, Progress& progress);
+                                           const Instruments& instruments, run::Progress& progress);
 
 }  // namespace q3d::pipeline::evaluation

@@ -9,10 +9,12 @@
 #include <thread>
 
 #include "manifests/digest.h"
+#include "pipeline/candidates/ingest.h"
 #include "pipeline/evaluation/dataset_evaluator.h"
 #include "pipeline/evaluation/hidden_truth.h"
-#include "pipeline/ingest.h"
-#include "pipeline/interrupt.h"
+#include "pipeline/network/torch_bodies.h"
+#include "pipeline/network/torch_network.h"
+#include "pipeline/run/interrupt.h"
 
 namespace q3d::pipeline::evaluation {
 namespace {
@@ -34,10 +36,10 @@ std::vector<SampleRecord> evenly_spaced(std::vector<SampleRecord> records, std::
 }
 
 LoadedDataset load(const EvaluatedDataset& dataset, std::int64_t limit) {
-  const DatasetConfig& source = dataset.source;
+  const config::DatasetConfig& source = dataset.source;
   LoadedDataset loaded;
   manifests::DigestCache digests{{}};  // remembers nothing: an evaluation leaves no files but its own
-  auto [read, annotations_sha256] = read_dataset(source, digests);
+  auto [read, annotations_sha256] = candidates::read_dataset(source, digests);
   loaded.result.name = source.name + "/" + source.split;
   loaded.result.annotations_sha256 = std::move(annotations_sha256);
   loaded.result.notes = std::move(read.notes);
@@ -73,7 +75,7 @@ Evaluation evaluate(const EvaluationConfig& config, const EvaluationOptions& opt
   evaluation.checkpoint = config.network.checkpoint.filename().string();
   evaluation.checkpoint_sha256 = manifests::sha256_file(config.network.checkpoint);
   evaluation.smal_asset_sha256 = manifests::sha256_file(config.network.smal_asset);
-  evaluation.device_key = device_key(config.network);
+  evaluation.device_key = network::device_key(config.network);
 
   std::vector<LoadedDataset> loaded;
   std::int64_t total = 0;
@@ -82,17 +84,17 @@ Evaluation evaluate(const EvaluationConfig& config, const EvaluationOptions& opt
     total += static_cast<std::int64_t>(loaded.back().records.size());
   }
 
-  std::unique_ptr<Network> network;
-  std::unique_ptr<BodyMeshes> meshes;
-  DeviceWorker device;  // ends before what it works on
+  std::unique_ptr<device::Network> network;
+  std::unique_ptr<device::BodyMeshes> meshes;
+  device::DeviceWorker device;  // ends before what it works on
   device.run([&] {
-    network = std::make_unique<Network>(config.network, config.tta);
-    meshes = std::make_unique<BodyMeshes>(config.network.smal_asset);
+    network = network::load_network(config.network, config.tta);
+    meshes = network::load_body_meshes(config.network.smal_asset);
   });
   evaluation.device = network->device_description();
   evaluation.device_warning = network->device_warning();
   const Instruments instruments{&plan, meshes.get(), network.get(), &device, options.seed};
-  Progress progress("evaluated", total, options.quiet);
+  run::Progress progress("evaluated", total, options.quiet);
   for (LoadedDataset& dataset : loaded) {
     DatasetResult& result = evaluation.datasets.emplace_back(std::move(dataset.result));
     result.samples = evaluate_records(std::move(dataset.records), instruments, progress);

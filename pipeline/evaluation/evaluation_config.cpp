@@ -2,9 +2,9 @@
 
 #include <fmt/format.h>
 
-#include "pipeline/config_layers.h"
-#include "pipeline/errors.h"
-#include "pipeline/json_fields.h"
+#include "pipeline/config/config_layers.h"
+#include "pipeline/config/json_fields.h"
+#include "pipeline/run/errors.h"
 
 namespace q3d::pipeline::evaluation {
 namespace {
@@ -14,13 +14,13 @@ namespace fs = std::filesystem;
 
 void resolve_paths(json& config, const fs::path& folder) {
   if (config.contains("network")) {
-    resolve_path(config["network"], "checkpoint", folder);
-    resolve_path(config["network"], "smal_asset", folder);
+    config::resolve_path(config["network"], "checkpoint", folder);
+    config::resolve_path(config["network"], "smal_asset", folder);
   }
-  resolve_dataset_paths(config, "datasets", folder);
+  config::resolve_dataset_paths(config, "datasets", folder);
   if (!config.contains("datasets") || !config["datasets"].is_array()) return;
   for (json& dataset : config["datasets"]) {
-    for (const char* key : {"truth", "masks"}) resolve_path(dataset, key, folder);
+    for (const char* key : {"truth", "masks"}) config::resolve_path(dataset, key, folder);
   }
 }
 
@@ -28,7 +28,8 @@ void resolve_paths(json& config, const fs::path& folder) {
 fs::path take_path(json& object, const char* key, const std::string& where) {
   if (!object.is_object() || !object.contains(key)) return {};
   if (!object[key].is_string()) {
-    throw ConfigError(fmt::format("{}: \"{}\" must be a string, got {}", where, key, object[key].dump()));
+    throw run::ConfigError(
+        fmt::format("{}: \"{}\" must be a string, got {}", where, key, object[key].dump()));
   }
   const fs::path path = object[key].get<std::string>();
   object.erase(key);
@@ -38,7 +39,7 @@ fs::path take_path(json& object, const char* key, const std::string& where) {
 }  // namespace
 
 EvaluationConfig load_evaluation_config(const std::vector<fs::path>& files, const fs::path& checkpoint) {
-  ConfigLayers layers = read_config_layers(files, resolve_paths);
+  config::ConfigLayers layers = config::read_config_layers(files, resolve_paths);
   json& build = layers.resolved;
   EvaluationConfig config;
   if (build.contains("datasets") && build["datasets"].is_array()) {
@@ -48,18 +49,19 @@ EvaluationConfig load_evaluation_config(const std::vector<fs::path>& files, cons
       dataset.truth = take_path(build["datasets"][i], "truth", where);
       dataset.masks = take_path(build["datasets"][i], "masks", where);
       if (dataset.truth.empty() && !dataset.masks.empty()) {
-        throw ConfigError(where +
-                          ": \"masks\" is the folder of a \"truth\" file's masks, and there is no "
-                          "\"truth\"; a format's own masks are found without it");
+        throw run::ConfigError(where +
+                               ": \"masks\" is the folder of a \"truth\" file's masks, and there is no "
+                               "\"truth\"; a format's own masks are found without it");
       }
     }
   }
   if (!checkpoint.empty() && (!build.contains("network") || build["network"].is_object())) {
     build["network"]["checkpoint"] = fs::absolute(checkpoint).string();
   }
-  const BuildConfig parsed = parse_build_config(build, layers.where);
+  const config::BuildConfig parsed = config::parse_build_config(build, layers.where);
   if (parsed.network.checkpoint.empty()) {
-    throw ConfigError(layers.where + ": the key \"network\" is missing: there is no network to evaluate");
+    throw run::ConfigError(layers.where +
+                           ": the key \"network\" is missing: there is no network to evaluate");
   }
   for (std::size_t i = 0; i < config.datasets.size(); ++i) config.datasets[i].source = parsed.datasets[i];
   config.network = parsed.network;

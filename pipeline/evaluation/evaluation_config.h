@@ -7,20 +7,20 @@
 #include <filesystem>
 #include <vector>
 
-#include "pipeline/build_config.h"
+#include "pipeline/config/build_config.h"
 
 namespace q3d::pipeline::evaluation {
 
 struct EvaluatedDataset {
-  DatasetConfig source;
+  config::DatasetConfig source;
   std::filesystem::path truth;  // hidden truth of a 2D-only set; empty when there is none
   std::filesystem::path masks;  // folder that the truth's mask paths start from; empty: masks are not used
 };
 
 struct EvaluationConfig {
   std::vector<EvaluatedDataset> datasets;
-  NetworkConfig network;
-  TtaConfig tta;
+  config::NetworkConfig network;
+  config::TtaConfig tta;
   nlohmann::json as_written;  // the merged JSON, paths as the user wrote them
 };
 

@@ -9,7 +9,7 @@
 #include <set>
 #include <stdexcept>
 
-#include "loaders/picture_finder.h"
+#include "loaders/formats/picture_finder.h"
 #include "manifests/atomic_file.h"
 
 namespace q3d::pipeline::evaluation {
@@ -73,7 +73,8 @@ manifests::Keypoints read_keypoints(const json& object, const std::string& where
   return keypoints;
 }
 
-PictureTruth read_picture(const json& object, const std::string& where, loaders::PictureFinder* masks) {
+PictureTruth read_picture(const json& object, const std::string& where,
+                          loaders::formats::PictureFinder* masks) {
   if (!object.is_object()) fail(where, fmt::format("got {}, expected an object", object.type_name()));
   PictureTruth truth;
   const json& species = field(object, "species", where);
@@ -89,7 +90,7 @@ PictureTruth read_picture(const json& object, const std::string& where, loaders:
   if (masks != nullptr && object.contains("mask_path")) {
     const json& name = object.at("mask_path");
     if (!name.is_string()) fail(where, fmt::format("mask_path: got {}, expected a text", name.dump()));
-    const loaders::FoundPicture found = masks->find(name.get<std::string>());
+    const loaders::formats::FoundPicture found = masks->find(name.get<std::string>());
     if (found.failure != manifests::Reason::none) {
       fail(where, fmt::format("mask_path: {}, expected a file below the folder of masks", found.got));
     }
@@ -106,7 +107,7 @@ HiddenTruth::HiddenTruth(const std::filesystem::path& file, const std::filesyste
   if (!document.is_object() || !document.contains("pictures") || !document["pictures"].is_object()) {
     fail(file.string(), "expected a JSON object with \"pictures\": {<name>: {...}}");
   }
-  std::optional<loaders::PictureFinder> finder;
+  std::optional<loaders::formats::PictureFinder> finder;
   if (!masks.empty()) finder.emplace(masks, std::filesystem::path(), std::filesystem::path());
   for (const auto& [name, object] : document["pictures"].items()) {
     pictures_[name] = read_picture(object, file.string() + ": " + name, finder ? &*finder : nullptr);

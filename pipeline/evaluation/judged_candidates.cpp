@@ -6,11 +6,11 @@
 #include <stdexcept>
 
 #include "manifests/atomic_file.h"
-#include "pipeline/errors.h"
+#include "pipeline/build/publish.h"
 #include "pipeline/evaluation/csv.h"
-#include "pipeline/publish.h"
-#include "pipeline/stage_store.h"
-#include "pipeline/unit_tables.h"
+#include "pipeline/run/errors.h"
+#include "pipeline/stages/stage_store.h"
+#include "pipeline/unit/unit_tables.h"
 
 namespace q3d::pipeline::evaluation {
 namespace {
@@ -43,8 +43,8 @@ std::vector<PublishedVerdict> read_verdicts(const fs::path& file) {
 }
 
 // Opening a store would make its folder.
-StageStore open_store(const fs::path& out, const std::string& stage, const std::string& key) {
-  const fs::path folder = stage_folder(out, stage, key);
+stages::StageStore open_store(const fs::path& out, const std::string& stage, const std::string& key) {
+  const fs::path folder = stages::stage_folder(out, stage, key);
   if (!fs::exists(folder)) {
     throw std::runtime_error(
         fmt::format("{}: the stage's folder is gone; `build` with the same config makes "
@@ -54,19 +54,19 @@ StageStore open_store(const fs::path& out, const std::string& stage, const std::
   return {out, stage, key};
 }
 
-manifests::Table load(const StageStore& store, const Unit& unit) {
+manifests::Table load(const stages::StageStore& store, const candidates::Unit& unit) {
   if (auto table = store.load(unit)) return std::move(*table);
   throw std::runtime_error(fmt::format("{}: not finished; `build` with the same config makes it again",
                                        store.file(unit).string()));
 }
 
-void add_unit(const Unit& unit, std::span<const Candidate> candidates,
-              std::span<const PublishedVerdict> verdicts, const std::vector<PredictedSample>& predicted,
-              const std::vector<RefinedSample>& refined, JudgedPool& pool) {
-  std::vector<const BodyPrediction*> refined_of(unit.count, nullptr);
-  for (const RefinedSample& sample : refined) refined_of.at(sample.sample) = &sample.body;
+void add_unit(const candidates::Unit& unit, std::span<const candidates::Candidate> candidates,
+              std::span<const PublishedVerdict> verdicts, const std::vector<unit::PredictedSample>& predicted,
+              const std::vector<unit::RefinedSample>& refined, JudgedPool& pool) {
+  std::vector<const device::BodyPrediction*> refined_of(unit.count, nullptr);
+  for (const unit::RefinedSample& sample : refined) refined_of.at(sample.sample) = &sample.body;
   for (std::size_t i = 0; i < unit.count; ++i) {
-    if (candidates[i].role != Role::pseudo) continue;
+    if (candidates[i].role != config::Role::pseudo) continue;
     if (predicted.at(i).failure != Reason::none) {
       ++pool.failed;
       continue;
@@ -86,43 +86,45 @@ void add_unit(const Unit& unit, std::span<const Candidate> candidates,
 
 }  // namespace
 
-const BodyPrediction* JudgedCandidate::label() const {
+const device::BodyPrediction* JudgedCandidate::label() const {
   if (verdict == Verdict::refined) return &*refined;
   return verdict == Verdict::retained ? &predicted : nullptr;
 }
 
-JudgedPool read_judged_pool(const BuildConfig& config, Workspace& workspace) {
-  if (!needs_network(config)) {
-    throw ConfigError(
+JudgedPool read_judged_pool(const config::BuildConfig& config, build::Workspace& workspace) {
+  if (!config::needs_network(config)) {
+    throw run::ConfigError(
         "no dataset of the config has the role \"pseudo\": there are no pseudo labels to judge");
   }
-  const Ingest& ingest = workspace.ingest();
-  const StageKeys keys =
-      stage_keys(config, judging_rules(config), ingest, workspace.assets(), workspace.device_key());
-  const fs::path folder = version_folder(workspace.out(), config, keys);
-  if (!is_published(folder, keys)) {
+  const candidates::Ingest& ingest = workspace.ingest();
+  const stages::StageKeys keys = stages::stage_keys(config, config::judging_rules(config), ingest,
+                                                    workspace.assets(), workspace.device_key());
+  const fs::path folder = build::version_folder(workspace.out(), config, keys);
+  if (!build::is_published(folder, keys)) {
     throw std::runtime_error(
         fmt::format("{}: there is no finished dataset of this config; run `build` with "
                     "the same config and output folder first",
                     folder.string()));
   }
   const std::vector<PublishedVerdict> verdicts = read_verdicts(folder / "verdicts.csv");
-  const bool fits = std::equal(
-      verdicts.begin(), verdicts.end(), ingest.candidates.begin(), ingest.candidates.end(),
-      [](const PublishedVerdict& verdict, const Candidate& each) { return verdict.id == each.record.id; });
+  const bool fits =
+      std::equal(verdicts.begin(), verdicts.end(), ingest.candidates.begin(), ingest.candidates.end(),
+                 [](const PublishedVerdict& verdict, const candidates::Candidate& each) {
+                   return verdict.id == each.record.id;
+                 });
   if (!fits) {
     throw std::runtime_error((folder / "verdicts.csv").string() + ": lists other candidates than the config");
   }
-  const StageStore predictions = open_store(workspace.out(), "predict", keys.predict);
-  const StageStore refinements = open_store(workspace.out(), "refine", keys.refine);
+  const stages::StageStore predictions = open_store(workspace.out(), "predict", keys.predict);
+  const stages::StageStore refinements = open_store(workspace.out(), "refine", keys.refine);
   JudgedPool pool;
   pool.dataset = folder.filename().string();
-  pool.content_id = read_dataset_manifest(folder).content_id;
-  for (const Unit& unit : ingest.units) {
+  pool.content_id = dataset::read_dataset_manifest(folder).content_id;
+  for (const candidates::Unit& unit : ingest.units) {
     add_unit(unit, std::span(ingest.candidates).subspan(unit.first, unit.count),
              std::span(verdicts).subspan(unit.first, unit.count),
-             predicted_from_table(load(predictions, unit)), refined_from_table(load(refinements, unit)),
-             pool);
+             unit::predicted_from_table(load(predictions, unit)),
+             unit::refined_from_table(load(refinements, unit)), pool);
   }
   return pool;
 }

@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "pipeline/workspace.h"
+#include "pipeline/build/workspace.h"
 
 namespace q3d::pipeline::evaluation {
 
@@ -13,11 +13,11 @@ struct JudgedCandidate {
   manifests::SampleRecord record;
   manifests::Verdict verdict = manifests::Verdict::failed;
   manifests::Reason reason = manifests::Reason::none;
-  BodyPrediction predicted;               // before refinement
-  std::optional<BodyPrediction> refined;  // of the refined
+  device::BodyPrediction predicted;               // before refinement
+  std::optional<device::BodyPrediction> refined;  // of the refined
 
   // The body that went into the dataset; null when the candidate is not in it.
-  const BodyPrediction* label() const;
+  const device::BodyPrediction* label() const;
 };
 
 struct JudgedPool {
@@ -29,6 +29,6 @@ struct JudgedPool {
 
 // Throws ConfigError when the config has no dataset of role `pseudo` or no thresholds, and std::runtime_error
 // when its dataset has not been published in workspace.out(), or a stage's files are gone.
-JudgedPool read_judged_pool(const BuildConfig& config, Workspace& workspace);
+JudgedPool read_judged_pool(const config::BuildConfig& config, build::Workspace& workspace);
 
 }  // namespace q3d::pipeline::evaluation

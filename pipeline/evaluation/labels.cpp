@@ -7,9 +7,10 @@
 
 #include "manifests/digest.h"
 #include "pipeline/evaluation/hidden_truth.h"
-#include "pipeline/interrupt.h"
-#include "pipeline/progress.h"
-#include "pipeline/unit_steps.h"
+#include "pipeline/network/torch_bodies.h"
+#include "pipeline/run/interrupt.h"
+#include "pipeline/run/progress.h"
+#include "pipeline/unit/unit_steps.h"
 
 namespace q3d::pipeline::evaluation {
 namespace {
@@ -30,7 +31,7 @@ Truths read_truths(const JudgedPool& pool, const LabelOptions& options, LabelEva
   for (const JudgedCandidate& candidate : pool.candidates) truths.records.push_back(candidate.record);
   truths.keypoints.resize(truths.records.size());
   for (const auto& file : options.truth) {
-    throw_if_interrupted();
+    run::throw_if_interrupted();
     const HiddenTruth truth(file, options.masks);
     truth.complete(truths.records);
     for (std::size_t i = 0; i < truths.records.size(); ++i) {
@@ -44,19 +45,19 @@ Truths read_truths(const JudgedPool& pool, const LabelOptions& options, LabelEva
 
 class LabelMeasurer {
  public:
-  LabelMeasurer(const JudgedPool& pool, const Truths& truths, const BodyMeshes& meshes)
+  LabelMeasurer(const JudgedPool& pool, const Truths& truths, const device::BodyMeshes& meshes)
       : pool_(pool), truths_(truths), meshes_(meshes) {}
 
   // Candidates [first, first + count).
   std::vector<MeasuredCandidate> measure_some(std::size_t first, std::size_t count) {
     std::vector<double> mask_areas(count, 0.0);
     tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
-      if (interrupted()) return;
-      mask_areas[i] = decode_sample(truths_.records[first + i],
-                                    {.patch = true, .stored_crop = false, .mask_area = true}, {})
+      if (run::interrupted()) return;
+      mask_areas[i] = unit::decode_sample(truths_.records[first + i],
+                                          {.patch = true, .stored_crop = false, .mask_area = true}, {})
                           .mask_area_px;
     });
-    throw_if_interrupted();
+    run::throw_if_interrupted();
     std::vector<Target> targets;
     std::vector<const manifests::SampleRecord*> records;
     for (std::size_t i = 0; i < count; ++i) {
@@ -83,7 +84,7 @@ class LabelMeasurer {
       manifests::SampleRecord record = candidate.record;
       record.keypoints = *truths_.keypoints[index];
       projected.emplace();
-      projected->keypoints = crop_keypoints(record);
+      projected->keypoints = unit::crop_keypoints(record);
       projected->normaliser_px = target.normaliser_px;
     }
     measured.predicted = measure_body(candidate.predicted, target, projected);
@@ -95,12 +96,12 @@ class LabelMeasurer {
     return measured;
   }
 
-  MeasuredBody measure_body(const BodyPrediction& body, const Target& target,
+  MeasuredBody measure_body(const device::BodyPrediction& body, const Target& target,
                             const std::optional<Target>& projected) const {
     MeasuredBody measured;
-    std::vector<BodyMesh> mesh;
+    std::vector<device::BodyMesh> mesh;
     if (!target.vertices.empty()) {
-      const BodyShape shape{body.rotations, body.betas};
+      const device::BodyShape shape{body.rotations, body.betas};
       mesh = meshes_.pose(std::span(&shape, 1));
     }
     measured.annotated = measure(body, mesh.empty() ? nullptr : &mesh.front(), target);
@@ -110,7 +111,7 @@ class LabelMeasurer {
 
   const JudgedPool& pool_;
   const Truths& truths_;
-  const BodyMeshes& meshes_;
+  const device::BodyMeshes& meshes_;
 };
 
 bool is_kept(const MeasuredCandidate& candidate) {
@@ -177,17 +178,17 @@ std::vector<LabelRow> group_labels(const std::vector<MeasuredCandidate>& candida
   return rows;
 }
 
-LabelEvaluation evaluate_labels(const BuildConfig& config, const LabelOptions& options) {
-  Workspace workspace(config, options.run);
+LabelEvaluation evaluate_labels(const config::BuildConfig& config, const LabelOptions& options) {
+  build::Workspace workspace(config, options.run);
   const JudgedPool pool = read_judged_pool(config, workspace);
   LabelEvaluation evaluation;
   evaluation.dataset = pool.dataset;
   evaluation.content_id = pool.content_id;
   evaluation.failed = pool.failed;
   const Truths truths = read_truths(pool, options, evaluation);
-  const BodyMeshes meshes(config.network.smal_asset);
-  LabelMeasurer measurer(pool, truths, meshes);
-  Progress progress("measured", static_cast<std::int64_t>(pool.candidates.size()), options.run.quiet);
+  const std::unique_ptr<device::BodyMeshes> meshes = network::load_body_meshes(config.network.smal_asset);
+  LabelMeasurer measurer(pool, truths, *meshes);
+  run::Progress progress("measured", static_cast<std::int64_t>(pool.candidates.size()), options.run.quiet);
   for (std::size_t first = 0; first < pool.candidates.size(); first += kChunk) {
     const std::size_t count = std::min(kChunk, pool.candidates.size() - first);
     for (MeasuredCandidate& measured : measurer.measure_some(first, count)) {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/build.h"
+#include "pipeline/build/build.h"
 #include "pipeline/evaluation/judged_candidates.h"
 #include "pipeline/evaluation/metric.h"
 
@@ -51,14 +51,14 @@ struct LabelEvaluation {
 };
 
 struct LabelOptions {
-  RunOptions run;                            // out: the output folder of the build
+  run::RunOptions run;                       // out: the output folder of the build
   std::vector<std::filesystem::path> truth;  // hidden truth of the pool; none: the records' own
   std::filesystem::path masks;               // folder that its mask paths start from; empty: not used
 };
 
 // Judges the dataset that `config` has built in options.run.out. Throws ConfigError, std::runtime_error,
 // Interrupted.
-LabelEvaluation evaluate_labels(const BuildConfig& config, const LabelOptions& options);
+LabelEvaluation evaluate_labels(const config::BuildConfig& config, const LabelOptions& options);
 
 // The rows of the groups that occur.
 std::vector<LabelRow> group_labels(const std::vector<MeasuredCandidate>& candidates);

@@ -5,6 +5,7 @@
 #include "pipeline/evaluation/labels.h"
 #include "pipeline/evaluation/report_values.h"
 #include "pipeline/evaluation/text_table.h"
+#include "pipeline/run/version.h"
 
 namespace q3d::pipeline::evaluation {
 namespace {
@@ -63,7 +64,7 @@ ordered_json to_json(const LabelEvaluation& evaluation) {
   }
   return {{"format", "quadruped3d-label-evaluation"},
           {"schema", 1},
-          {"toolkit", Q3D_VERSION},
+          {"toolkit", run::version()},
           {"dataset", evaluation.dataset},
           {"content_id", evaluation.content_id},
           {"truth_sha256", evaluation.truth_sha256},

@@ -4,7 +4,8 @@
 #include <stdexcept>
 
 #include "filters/metrics.h"
-#include "pipeline/unit_steps.h"
+#include "pipeline/unit/unit_steps.h"
+#include "smal/axis_angle.h"
 
 namespace q3d::pipeline::evaluation {
 namespace {
@@ -39,14 +40,14 @@ MetricMean mean_of(std::span<const MetricValues* const> samples, std::size_t met
 
 Target make_target(const manifests::SampleRecord& record, double mask_area_px) {
   Target target;
-  target.keypoints = crop_keypoints(record);
+  target.keypoints = unit::crop_keypoints(record);
   target.normalised_by_mask = mask_area_px > 0.0;
   if (target.normalised_by_mask) target.normaliser_px = std::sqrt(mask_area_px);
   if (record.truth && record.truth->has_keypoints_3d) target.keypoints_3d = record.truth->keypoints_3d;
   return target;
 }
 
-MetricValues measure(const BodyPrediction& body, const BodyMesh* mesh, const Target& target) {
+MetricValues measure(const device::BodyPrediction& body, const device::BodyMesh* mesh, const Target& target) {
   const double normaliser = target.normaliser_px;
   MetricValues values;
   values[index_of(Metric::auc)] = percent(filters::auc(body.keypoints_2d, target.keypoints, normaliser));
@@ -66,17 +67,17 @@ MetricValues measure(const BodyPrediction& body, const BodyMesh* mesh, const Tar
   return values;
 }
 
-void add_true_meshes(std::span<const manifests::SampleRecord* const> records, const BodyMeshes& meshes,
-                     std::span<Target> targets) {
-  std::vector<BodyShape> bodies;
+void add_true_meshes(std::span<const manifests::SampleRecord* const> records,
+                     const device::BodyMeshes& meshes, std::span<Target> targets) {
+  std::vector<device::BodyShape> bodies;
   std::vector<std::size_t> positions;
   for (std::size_t i = 0; i < records.size(); ++i) {
     const auto& truth = records[i]->truth;
     if (!truth || !truth->has_pose || !truth->has_betas) continue;
-    bodies.push_back({rotation_matrices(truth->pose_axis_angle), truth->betas});
+    bodies.push_back({smal::rotation_matrices(truth->pose_axis_angle), truth->betas});
     positions.push_back(i);
   }
-  std::vector<BodyMesh> posed = meshes.pose(bodies);
+  std::vector<device::BodyMesh> posed = meshes.pose(bodies);
   for (std::size_t j = 0; j < posed.size(); ++j) {
     Target& target = targets[positions[j]];
     target.vertices = std::move(posed[j].vertices);

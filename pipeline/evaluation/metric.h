@@ -8,8 +8,8 @@
 #include <span>
 #include <vector>
 
-#include "pipeline/body_meshes.h"
-#include "pipeline/network.h"
+#include "pipeline/device/body_meshes.h"
+#include "pipeline/device/network.h"
 
 namespace q3d::pipeline::evaluation {
 
@@ -44,8 +44,8 @@ MetricMean mean_of(std::span<const MetricValues* const> samples, std::size_t met
 
 // What a prediction is measured against.
 struct Target {
-  CropKeypoints keypoints{};     // annotated, crop units and weight
-  double normaliser_px = 256.0;  // sqrt(mask area) of the 256-px crop, or 256 for the whole crop
+  device::CropKeypoints keypoints{};  // annotated, crop units and weight
+  double normaliser_px = 256.0;       // sqrt(mask area) of the 256-px crop, or 256 for the whole crop
   bool normalised_by_mask = false;
   std::optional<std::array<float, manifests::kNumKeypoints * 3>> keypoints_3d;  // SMAL units
   std::vector<float> vertices;  // V x 3, SMAL units; empty when the true mesh is not known
@@ -55,11 +55,11 @@ struct Target {
 Target make_target(const manifests::SampleRecord& record, double mask_area_px);
 
 // `mesh` is the predicted body's; it is needed when the target has vertices, and may be null otherwise.
-MetricValues measure(const BodyPrediction& body, const BodyMesh* mesh, const Target& target);
+MetricValues measure(const device::BodyPrediction& body, const device::BodyMesh* mesh, const Target& target);
 
 // The true bodies of the records that state pose and shape, for their targets' vertices; keypoints_3d are
 // filled from the body where the record lacks them. `records` and `targets` go together.
-void add_true_meshes(std::span<const manifests::SampleRecord* const> records, const BodyMeshes& meshes,
-                     std::span<Target> targets);
+void add_true_meshes(std::span<const manifests::SampleRecord* const> records,
+                     const device::BodyMeshes& meshes, std::span<Target> targets);
 
 }  // namespace q3d::pipeline::evaluation

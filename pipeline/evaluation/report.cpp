@@ -6,6 +6,7 @@
 #include "pipeline/evaluation/csv.h"
 #include "pipeline/evaluation/report_values.h"
 #include "pipeline/evaluation/text_table.h"
+#include "pipeline/run/version.h"
 
 namespace q3d::pipeline::evaluation {
 namespace {
@@ -186,7 +187,7 @@ ordered_json to_json(const Evaluation& evaluation, const Tables& tables) {
   for (const DatasetResult& dataset : evaluation.datasets) datasets.push_back(dataset_json(dataset));
   return {{"format", kEvaluationFormat},
           {"schema", kEvaluationSchema},
-          {"toolkit", Q3D_VERSION},
+          {"toolkit", run::version()},
           {"checkpoint", {{"file", evaluation.checkpoint}, {"sha256", evaluation.checkpoint_sha256}}},
           {"smal_asset_sha256", evaluation.smal_asset_sha256},
           {"device", evaluation.device_key},

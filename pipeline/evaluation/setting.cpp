@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "filters/keypoint_choice.h"
-#include "pipeline/errors.h"
+#include "pipeline/run/errors.h"
 
 namespace q3d::pipeline::evaluation {
 namespace {
@@ -20,20 +20,20 @@ void add_kept_iterate(Plan& plan, int iterations, double share) {
 
 void check(const SettingOptions& options) {
   if (options.tta_iterations < 0) {
-    throw ConfigError(fmt::format("TTA iterations: got {}, expected 0 or more", options.tta_iterations));
+    throw run::ConfigError(fmt::format("TTA iterations: got {}, expected 0 or more", options.tta_iterations));
   }
   for (const int iterate : options.curve) {
     if (iterate < 0)
-      throw ConfigError(fmt::format("iterates to measure: got {}, expected 0 or more", iterate));
+      throw run::ConfigError(fmt::format("iterates to measure: got {}, expected 0 or more", iterate));
   }
   for (const double share : options.visible_shares) {
     if (!(share > 0.0 && share <= 1.0)) {
-      throw ConfigError(
+      throw run::ConfigError(
           fmt::format("shares of visible keypoints: got {}, expected more than 0, at most 1", share));
     }
   }
   if (!options.visible_shares.empty() && options.tta_iterations == 0) {
-    throw ConfigError(
+    throw run::ConfigError(
         "shares of visible keypoints say what adaptation is given: say how many iterations too");
   }
 }
@@ -62,12 +62,12 @@ Plan plan_settings(const SettingOptions& options) {
   return plan;
 }
 
-CropKeypoints hide_keypoints(const CropKeypoints& keypoints, double share, std::uint64_t seed,
-                             const std::string& sample_id) {
+device::CropKeypoints hide_keypoints(const device::CropKeypoints& keypoints, double share, std::uint64_t seed,
+                                     const std::string& sample_id) {
   const std::vector<std::size_t> visible = filters::shuffled_visible(keypoints, seed, sample_id);
   // The tolerance keeps 0.7 * 10 at 7.
   const auto shown = static_cast<std::size_t>(std::ceil(share * static_cast<double>(visible.size()) - 1e-9));
-  CropKeypoints result = keypoints;
+  device::CropKeypoints result = keypoints;
   for (std::size_t i = shown; i < visible.size(); ++i) result[3 * visible[i] + 2] = 0.0F;
   return result;
 }

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/network.h"
+#include "pipeline/device/network.h"
 
 namespace q3d::pipeline::evaluation {
 
@@ -40,7 +40,7 @@ Plan plan_settings(const SettingOptions& options);
 
 // `keypoints` with all but ceil(share * visible) of the visible ones hidden: a random choice by seed and
 // sample id, the same on every machine. Of one sample, a smaller share's choice is part of a larger one's.
-CropKeypoints hide_keypoints(const CropKeypoints& keypoints, double share, std::uint64_t seed,
-                             const std::string& sample_id);
+device::CropKeypoints hide_keypoints(const device::CropKeypoints& keypoints, double share, std::uint64_t seed,
+                                     const std::string& sample_id);
 
 }  // namespace q3d::pipeline::evaluation

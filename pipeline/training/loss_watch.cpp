@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace q3d::pipeline {
+namespace q3d::pipeline::training {
 namespace {
 
 constexpr std::int64_t kTrustedAfter = 50;  // losses; before that the mean says little
@@ -26,4 +26,4 @@ std::optional<std::string> LossWatch::check(double loss, double gradient_norm, d
   return std::nullopt;
 }
 
-}  // namespace q3d::pipeline
+}  // namespace q3d::pipeline::training

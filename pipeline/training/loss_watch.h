@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-namespace q3d::pipeline {
+namespace q3d::pipeline::training {
 
 // Compares each loss with the running mean of those before it. Part of a run's state.
 struct LossWatch {
@@ -16,4 +16,4 @@ struct LossWatch {
   std::optional<std::string> check(double loss, double gradient_norm, double divergence_factor);
 };
 
-}  // namespace q3d::pipeline
+}  // namespace q3d::pipeline::training

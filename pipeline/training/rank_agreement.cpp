@@ -4,11 +4,11 @@
 
 #include <vector>
 
-#include "pipeline/errors.h"
+#include "pipeline/run/errors.h"
 
-namespace q3d::pipeline {
+namespace q3d::pipeline::training {
 
-void require_same_run(const model::Collective& ranks, const std::string& key,
+void require_same_run(const model::ranks::Collective& ranks, const std::string& key,
                       const TrainingPosition& position) {
   const auto row = [](const std::vector<std::int64_t>& numbers) {
     return torch::tensor(numbers, torch::kInt64).unsqueeze(0);
@@ -17,11 +17,11 @@ void require_same_run(const model::Collective& ranks, const std::string& key,
   const torch::Tensor positions = ranks.gather(row({position.phase, position.step}));
   for (std::int64_t rank = 1; rank < ranks.size(); ++rank) {
     if (!torch::equal(keys[rank], keys[0])) {
-      throw ConfigError(fmt::format(
+      throw run::ConfigError(fmt::format(
           "rank {} was started with another configuration, other pools or other assets than rank 0", rank));
     }
     if (!torch::equal(positions[rank], positions[0])) {
-      throw ConfigError(fmt::format(
+      throw run::ConfigError(fmt::format(
           "rank {} does not find the training state that rank 0 finds; --out must be a folder that all ranks "
           "see",
           rank));
@@ -29,4 +29,4 @@ void require_same_run(const model::Collective& ranks, const std::string& key,
   }
 }
 
-}  // namespace q3d::pipeline
+}  // namespace q3d::pipeline::training

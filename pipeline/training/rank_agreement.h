@@ -3,15 +3,15 @@
 
 #include <string>
 
-#include "model/collective.h"
+#include "model/ranks/collective.h"
 #include "pipeline/training/training_state.h"
 
-namespace q3d::pipeline {
+namespace q3d::pipeline::training {
 
 // Throws ConfigError on every rank, naming the first that differs from rank 0, unless all have the same key
 // of configuration, pools and assets (64 characters) and found the same state to go on from. Blocks until all
 // ranks call it.
-void require_same_run(const model::Collective& ranks, const std::string& key,
+void require_same_run(const model::ranks::Collective& ranks, const std::string& key,
                       const TrainingPosition& position);
 
-}  // namespace q3d::pipeline
+}  // namespace q3d::pipeline::training

@@ -4,18 +4,18 @@
 
 #include <map>
 
-#include "pipeline/config_layers.h"
-#include "pipeline/errors.h"
-#include "pipeline/json_fields.h"
+#include "pipeline/config/config_layers.h"
+#include "pipeline/config/json_fields.h"
+#include "pipeline/run/errors.h"
 
-namespace q3d::pipeline {
+namespace q3d::pipeline::training {
 namespace {
 
 using nlohmann::json;
 namespace fs = std::filesystem;
 
 void require(bool holds, const std::string& where, const std::string& what) {
-  if (!holds) throw ConfigError(where + ": " + what);
+  if (!holds) throw run::ConfigError(where + ": " + what);
 }
 
 std::vector<std::string> texts(const json& list, const std::string& where) {
@@ -30,7 +30,7 @@ std::vector<std::string> texts(const json& list, const std::string& where) {
 
 void parse_network(const json& object, const std::string& where, TrainingNetworkConfig& network) {
   std::string initial, encoders, smal_asset, priors;
-  JsonFields fields(object, where);
+  config::JsonFields fields(object, where);
   fields.require("initial", initial);
   fields.read("encoders", encoders);
   fields.require("smal_asset", smal_asset);
@@ -38,14 +38,14 @@ void parse_network(const json& object, const std::string& where, TrainingNetwork
   if (const json* parts = fields.child("without")) {
     network.without = texts(*parts, where + ": without");
     for (const std::string& part : network.without) {
-      require_one_of(part, {"bio_features", "initial_betas", "keypoint_tokens"}, where + ": without");
+      config::require_one_of(part, {"bio_features", "initial_betas", "keypoint_tokens"}, where + ": without");
     }
   }
   fields.read("device", network.device);
   fields.read("precision", network.precision);
   fields.read("compute_threads", network.compute_threads);
   fields.finish();
-  require_one_of(network.precision, {"auto", "float32", "bfloat16"}, where + ": precision");
+  config::require_one_of(network.precision, {"auto", "float32", "bfloat16"}, where + ": precision");
   require(network.compute_threads >= 0, where, "\"compute_threads\" must be 0 (all cores) or more");
   network.initial = initial;
   network.encoders = encoders;
@@ -58,7 +58,7 @@ std::map<std::string, PoolConfig> parse_pools(const json& object, const std::str
   std::map<std::string, PoolConfig> pools;
   for (const auto& [name, value] : object.items()) {
     const std::string here = where + "." + name;
-    JsonFields fields(value, here);
+    config::JsonFields fields(value, here);
     PoolConfig pool{name, {}, 1.0};
     const json* shards = fields.child("shards");
     require(shards != nullptr, here, "the key \"shards\" is missing");
@@ -76,7 +76,7 @@ PhaseConfig parse_phase(const json& object, const std::string& where,
   PhaseConfig phase;
   int steps = 0;
   int warm_up_steps = 0;
-  JsonFields fields(object, where);
+  config::JsonFields fields(object, where);
   fields.require("name", phase.name);
   fields.read("objective", phase.objective);
   fields.require("steps", steps);
@@ -91,17 +91,17 @@ PhaseConfig parse_phase(const json& object, const std::string& where,
   std::vector<std::string> known;
   for (const auto& [name, pool] : pools) known.push_back(name);
   for (const std::string& name : texts(*names, where + ": pools")) {
-    require_one_of(name, known, where + ": pools");
+    config::require_one_of(name, known, where + ": pools");
     phase.pools.push_back(pools.at(name));
   }
-  require_one_of(phase.objective, {"prima", "encoders"}, where + ": objective");
+  config::require_one_of(phase.objective, {"prima", "encoders"}, where + ": objective");
   require(steps >= 1, where, fmt::format("\"steps\" must be at least 1, got {}", steps));
   require(warm_up_steps >= 0 && warm_up_steps < steps, where,
           fmt::format("\"warm_up_steps\" must be 0 to less than \"steps\", got {}", warm_up_steps));
   require(phase.ief_iterations >= 1 && phase.ief_iterations <= 16, where,
           "\"ief_iterations\" must be 1 to 16");
   require(phase.learning_rate > 0.0, where, "\"learning_rate\" must be greater than 0");
-  require_one_of(phase.decay, {"linear", "none"}, where + ": decay");
+  config::require_one_of(phase.decay, {"linear", "none"}, where + ": decay");
   phase.steps = steps;
   phase.warm_up_steps = warm_up_steps;
   return phase;
@@ -112,7 +112,7 @@ std::vector<PhaseConfig> parse_stage(const json& stages, const std::string& wher
   require(stages.is_object(), where, "must be an object of stages");
   std::vector<std::string> known;
   for (const auto& [name, phases] : stages.items()) known.push_back(name);
-  require_one_of(stage, known, where);
+  config::require_one_of(stage, known, where);
   const json& phases = stages.at(stage);
   require(phases.is_array() && !phases.empty(), where + "." + stage,
           "must be a list of phases with at least one");
@@ -123,8 +123,9 @@ std::vector<PhaseConfig> parse_stage(const json& stages, const std::string& wher
   return result;
 }
 
-void parse_augmentation(const json& object, const std::string& where, loaders::AugmentOptions& options) {
-  JsonFields fields(object, where);
+void parse_augmentation(const json& object, const std::string& where,
+                        loaders::pictures::AugmentOptions& options) {
+  config::JsonFields fields(object, where);
   fields.read("scale", options.scale);
   fields.read("rotation_deg", options.rotation_deg);
   fields.read("rotation_rate", options.rotation_rate);
@@ -142,7 +143,7 @@ void parse_augmentation(const json& object, const std::string& where, loaders::A
   require(options.colour >= 0.0 && options.colour < 1.0, where, "\"colour\" must be 0 to less than 1");
 }
 
-void parse_feed(JsonFields& fields, const std::string& where, TrainingConfig& config) {
+void parse_feed(config::JsonFields& fields, const std::string& where, TrainingConfig& config) {
   std::string weight = "label";
   fields.read("batch", config.feed.batch);
   fields.read("feed_ahead", config.feed_ahead);
@@ -153,12 +154,12 @@ void parse_feed(JsonFields& fields, const std::string& where, TrainingConfig& co
   }
   require(config.feed.batch >= 1 && config.feed.batch <= 65536, where, "\"batch\" must be 1 to 65536");
   require(config.feed_ahead >= 0 && config.feed_ahead <= 64, where, "\"feed_ahead\" must be 0 to 64");
-  require_one_of(weight, {"label", "raw_v"}, where + ": keypoint_weight");
-  config.feed.keypoint_weight = weight == "raw_v" ? KeypointWeight::raw_v : KeypointWeight::label;
+  config::require_one_of(weight, {"label", "raw_v"}, where + ": keypoint_weight");
+  config.feed.keypoint_weight = weight == "raw_v" ? feed::KeypointWeight::raw_v : feed::KeypointWeight::label;
 }
 
 void parse_loss_weights(const json& object, const std::string& where, model::LossWeights& weights) {
-  JsonFields fields(object, where);
+  config::JsonFields fields(object, where);
   fields.read("keypoints_3d", weights.keypoints_3d);
   fields.read("keypoints_2d", weights.keypoints_2d);
   fields.read("aux_keypoints_2d", weights.aux_keypoints_2d);
@@ -171,7 +172,7 @@ void parse_loss_weights(const json& object, const std::string& where, model::Los
   fields.finish();
 }
 
-void parse_optimisation(JsonFields& fields, const std::string& where, TrainingConfig& config) {
+void parse_optimisation(config::JsonFields& fields, const std::string& where, TrainingConfig& config) {
   std::string variant = "sound";
   int checkpoint_every = static_cast<int>(config.checkpoint_every);
   int log_every = static_cast<int>(config.log_every);
@@ -187,8 +188,8 @@ void parse_optimisation(JsonFields& fields, const std::string& where, TrainingCo
   fields.read("seed", config.seed);
   fields.read("checkpoint_every", checkpoint_every);
   fields.read("log_every", log_every);
-  require_one_of(variant, {"sound", "official"}, where + ": loss_variant");
-  require_one_of(config.model_dtype, {"float32", "float16"}, where + ": model_dtype");
+  config::require_one_of(variant, {"sound", "official"}, where + ": loss_variant");
+  config::require_one_of(config.model_dtype, {"float32", "float16"}, where + ": model_dtype");
   require(config.backbone_rate >= 0.0, where, "\"backbone_rate\" must be 0 or more");
   require(config.weight_decay >= 0.0, where, "\"weight_decay\" must be 0 or more");
   require(config.largest_gradient_norm >= 0.0, where,
@@ -204,7 +205,7 @@ void parse_optimisation(JsonFields& fields, const std::string& where, TrainingCo
 void resolve_paths(json& config, const fs::path& folder) {
   if (config.contains("network")) {
     for (const char* key : {"initial", "encoders", "smal_asset", "priors"}) {
-      resolve_path(config["network"], key, folder);
+      config::resolve_path(config["network"], key, folder);
     }
   }
   if (!config.contains("pools") || !config["pools"].is_object()) return;
@@ -220,10 +221,10 @@ void resolve_paths(json& config, const fs::path& folder) {
 
 TrainingConfig parse_training_config(const json& merged, const std::string& where, const std::string& stage) {
   TrainingConfig config;
-  JsonFields fields(merged, where);
+  config::JsonFields fields(merged, where);
   const auto child = [&](const char* key) -> const json& {
     const json* found = fields.child(key);
-    if (found == nullptr) throw ConfigError(fmt::format("{}: the key \"{}\" is missing", where, key));
+    if (found == nullptr) throw run::ConfigError(fmt::format("{}: the key \"{}\" is missing", where, key));
     return *found;
   };
   parse_network(child("network"), where + ": network", config.network);
@@ -237,10 +238,10 @@ TrainingConfig parse_training_config(const json& merged, const std::string& wher
 }
 
 TrainingConfig load_training_config(const std::vector<fs::path>& files, const std::string& stage) {
-  ConfigLayers layers = read_config_layers(files, resolve_paths);
+  config::ConfigLayers layers = config::read_config_layers(files, resolve_paths);
   TrainingConfig config = parse_training_config(layers.resolved, layers.where, stage);
   config.as_written = std::move(layers.as_written);
   return config;
 }
 
-}  // namespace q3d::pipeline
+}  // namespace q3d::pipeline::training

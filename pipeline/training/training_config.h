@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "model/loss_weights.h"
-#include "pipeline/training/feed.h"
+#include "pipeline/feed/feed.h"
 
-namespace q3d::pipeline {
+namespace q3d::pipeline::training {
 
 struct TrainingNetworkConfig {
   std::filesystem::path initial;   // checkpoint that training starts from
@@ -48,7 +48,7 @@ struct PhaseConfig {
 struct TrainingConfig {
   TrainingNetworkConfig network;
   std::vector<PhaseConfig> phases;  // of the chosen stage
-  FeedOptions feed;
+  feed::FeedOptions feed;
   int feed_ahead = 2;  // batches prepared in the background
   model::LossWeights loss_weights;
   model::LossVariant loss_variant = model::LossVariant::sound;
@@ -73,4 +73,4 @@ TrainingConfig load_training_config(const std::vector<std::filesystem::path>& fi
 TrainingConfig parse_training_config(const nlohmann::json& json, const std::string& where,
                                      const std::string& stage);
 
-}  // namespace q3d::pipeline
+}  // namespace q3d::pipeline::training

@@ -10,7 +10,7 @@
 
 #include "manifests/atomic_file.h"
 
-namespace q3d::pipeline {
+namespace q3d::pipeline::training {
 namespace {
 
 // A killed process may leave half a line, which counts as none.
@@ -55,4 +55,4 @@ void TrainingLog::write(const LogLine& line) {
   }
 }
 
-}  // namespace q3d::pipeline
+}  // namespace q3d::pipeline::training

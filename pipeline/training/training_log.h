@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-namespace q3d::pipeline {
+namespace q3d::pipeline::training {
 
 struct LogLine {
   int phase = 0;
@@ -38,4 +38,4 @@ class TrainingLog {
   std::unique_ptr<std::FILE, Close> file_;
 };
 
-}  // namespace q3d::pipeline
+}  // namespace q3d::pipeline::training

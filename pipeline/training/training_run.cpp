@@ -20,20 +20,20 @@
 #include "model/mixed_precision.h"
 #include "model/module_state.h"
 #include "model/priors.h"
-#include "model/process_group.h"
-#include "model/rank_place.h"
+#include "model/ranks/process_group.h"
+#include "model/ranks/rank_place.h"
 #include "model/trainer.h"
-#include "pipeline/errors.h"
-#include "pipeline/interrupt.h"
-#include "pipeline/progress.h"
+#include "pipeline/run/errors.h"
+#include "pipeline/run/interrupt.h"
+#include "pipeline/run/progress.h"
+#include "pipeline/run/random.h"
 #include "pipeline/training/rank_agreement.h"
 #include "pipeline/training/training_log.h"
 #include "pipeline/training/training_state.h"
-#include "pipeline/world/random.h"
-#include "smal/asset.h"
-#include "smal/body.h"
+#include "smal/tensors/asset.h"
+#include "smal/tensors/body.h"
 
-namespace q3d::pipeline {
+namespace q3d::pipeline::training {
 namespace {
 
 namespace fs = std::filesystem;
@@ -52,31 +52,32 @@ fs::path made(const fs::path& folder) {
   return folder;
 }
 
-model::RankPlace find_place() {
+model::ranks::RankPlace find_place() {
   try {
-    return model::rank_place_from_environment();
+    return model::ranks::rank_place_from_environment();
   } catch (const std::invalid_argument& error) {
-    throw ConfigError(error.what());
+    throw run::ConfigError(error.what());
   }
 }
 
 // Ranks of one machine share its cores.
-int own_cores(const model::RankPlace& place) {
+int own_cores(const model::ranks::RankPlace& place) {
   return std::max(1, static_cast<int>(std::thread::hardware_concurrency()) / place.local_size);
 }
 
-model::DeviceChoice choose_device(const TrainingNetworkConfig& network, const model::RankPlace& place) {
+model::DeviceChoice choose_device(const TrainingNetworkConfig& network,
+                                  const model::ranks::RankPlace& place) {
   model::configure_compute(network.compute_threads > 0 ? network.compute_threads : own_cores(place));
   try {
     return model::choose_device(network.device, place.local_rank);
   } catch (const std::invalid_argument& error) {
-    throw ConfigError(error.what());
+    throw run::ConfigError(error.what());
   }
 }
 
 // Tensors over the batch's arrays, which they keep alive.
-model::TrainingBatch to_tensors(FeedBatch&& from) {
-  const auto batch = std::make_shared<FeedBatch>(std::move(from));
+model::TrainingBatch to_tensors(feed::FeedBatch&& from) {
+  const auto batch = std::make_shared<feed::FeedBatch>(std::move(from));
   const auto view = [&batch](auto* data, std::vector<std::int64_t> shape, torch::ScalarType dtype) {
     shape.insert(shape.begin(), batch->size);
     return torch::from_blob(
@@ -105,7 +106,8 @@ TrainingConfig for_device(TrainingConfig config, torch::Device device) {
 }
 
 // The sizes of `file`'s network, and the switches of the paper's ablations.
-model::PrimaConfig initial_config(const smal::SafeTensors& file, const std::vector<std::string>& without) {
+model::PrimaConfig initial_config(const smal::tensors::SafeTensors& file,
+                                  const std::vector<std::string>& without) {
   model::PrimaConfig config = model::checkpoint_config(file);
   for (const std::string& part : without) {
     if (part == "bio_features") config.learn_bio_encoder = true;
@@ -118,13 +120,13 @@ model::PrimaConfig initial_config(const smal::SafeTensors& file, const std::vect
 // The initial network, with the encoders of another checkpoint where the config names one; one that learns
 // its bio encoder from random weights takes the backbone alone.
 std::shared_ptr<model::PrimaNet> initial_net(const TrainingNetworkConfig& network,
-                                             const smal::SmalAsset& asset, torch::Device device) {
-  const smal::SafeTensors file = smal::SafeTensors::open(network.initial);
+                                             const smal::tensors::SmalAsset& asset, torch::Device device) {
+  const smal::tensors::SafeTensors file = smal::tensors::SafeTensors::open(network.initial);
   const model::PrimaConfig config = initial_config(file, network.without);
   auto net = model::load_net(file, config, asset, {device, torch::kFloat32});
   if (network.encoders.empty()) return net;
   const torch::NoGradGuard no_grad;
-  const smal::SafeTensors encoders = smal::SafeTensors::open(network.encoders);
+  const smal::tensors::SafeTensors encoders = smal::tensors::SafeTensors::open(network.encoders);
   for (auto& parameter : net->named_parameters()) {
     const std::string& name = parameter.key();
     const bool taken = name.starts_with("backbone.") ||
@@ -159,7 +161,7 @@ std::string run_key(const TrainingConfig& config, const fs::path& out, bool reme
     nlohmann::json pools = nlohmann::json::array();
     for (const PoolConfig& pool : phase.pools) {
       nlohmann::json shards = nlohmann::json::array();
-      for (const fs::path& file : ShardPool(pool.name, pool.shards).files())
+      for (const fs::path& file : feed::ShardPool(pool.name, pool.shards).files())
         shards.push_back(digests.digest(file));
       pools.push_back({pool.name, shards, pool.weight});
     }
@@ -200,26 +202,25 @@ model::EncoderTrainerOptions encoder_options(const TrainingConfig& config, const
 
 // Of the draws of a phase.
 std::uint64_t phase_seed(const TrainingConfig& config, int phase_index) {
-  return world::Rng(config.seed, {static_cast<std::uint64_t>(phase_index)}).next();
+  return run::Rng(config.seed, {static_cast<std::uint64_t>(phase_index)}).next();
 }
 
 // Of dropout and stochastic depth in one step: ranks differ, and a resumed run needs no stored generator.
 std::uint64_t step_seed(const TrainingConfig& config, const TrainingPosition& position, int rank) {
-  return world::Rng(config.seed,
-                    {static_cast<std::uint64_t>(position.phase), static_cast<std::uint64_t>(position.step),
-                     static_cast<std::uint64_t>(rank)})
+  return run::Rng(config.seed, {static_cast<std::uint64_t>(position.phase),
+                                static_cast<std::uint64_t>(position.step), static_cast<std::uint64_t>(rank)})
       .next();
 }
 
-Feed open_feed(const TrainingConfig& config, const PhaseConfig& phase, int phase_index, int threads,
-               const model::Collective& ranks) {
-  std::vector<ShardPool> pools;
+feed::Feed open_feed(const TrainingConfig& config, const PhaseConfig& phase, int phase_index, int threads,
+                     const model::ranks::Collective& ranks) {
+  std::vector<feed::ShardPool> pools;
   std::vector<double> weights;
   for (const PoolConfig& pool : phase.pools) {
     pools.emplace_back(pool.name, pool.shards);
     weights.push_back(pool.weight);
   }
-  FeedOptions options = config.feed;
+  feed::FeedOptions options = config.feed;
   options.threads = threads;
   options.rank = ranks.rank();
   options.ranks = ranks.size();
@@ -227,7 +228,7 @@ Feed open_feed(const TrainingConfig& config, const PhaseConfig& phase, int phase
     // Phases draw from different streams.
     return {std::move(pools), weights, options, phase_seed(config, phase_index)};
   } catch (const std::invalid_argument& error) {
-    throw ConfigError(fmt::format("phase \"{}\": {}", phase.name, error.what()));
+    throw run::ConfigError(fmt::format("phase \"{}\": {}", phase.name, error.what()));
   }
 }
 
@@ -238,10 +239,10 @@ class Run {
         place_(find_place()),
         device_(choose_device(config.network, place_)),
         config_(for_device(config, device_.device)),
-        ranks_(model::join_ranks(place_, device_.device)),
+        ranks_(model::ranks::join_ranks(place_, device_.device)),
         lock_(leads() ? std::make_unique<manifests::FolderLock>(made(options.out)) : nullptr),
-        asset_(smal::load_asset(config.network.smal_asset)),
-        priors_(model::load_priors(smal::SafeTensors::open(config.network.priors), device_.device)),
+        asset_(smal::tensors::load_asset(config.network.smal_asset)),
+        priors_(model::load_priors(smal::tensors::SafeTensors::open(config.network.priors), device_.device)),
         key_(run_key(config, options.out, /*remember=*/leads())),
         stored_(load_state(state_path(), key_)) {
     if (stored_) position_ = stored_->position;
@@ -272,7 +273,7 @@ class Run {
     for (const PhaseConfig& phase : config_.phases) summary.steps_total += phase.steps;
     std::optional<TrainingLog> log;
     if (leads()) log.emplace(options_.out / "log.jsonl", position_.phase, position_.step);
-    Progress progress("trained steps", summary.steps_total, options_.quiet || !leads());
+    run::Progress progress("trained steps", summary.steps_total, options_.quiet || !leads());
     progress.advance(steps_done(), /*from_earlier_run=*/true);
     auto net = initial_net(config_.network, asset_, device_.device);
     if (stored_) model::restore_parameters(stored_->file, "", *net);
@@ -295,7 +296,7 @@ class Run {
   void meet() const { ranks_->sum(torch::zeros({1})); }
 
   bool any_rank_interrupted() const {
-    return ranks_->sum(torch::tensor({interrupted() ? 1 : 0})).item<int>() > 0;
+    return ranks_->sum(torch::tensor({run::interrupted() ? 1 : 0})).item<int>() > 0;
   }
 
   void save(const model::Learner& learner) const {
@@ -316,37 +317,37 @@ class Run {
   }
 
   std::unique_ptr<model::Learner> make_learner(const std::shared_ptr<model::PrimaNet>& net,
-                                               const PhaseConfig& phase, const Feed& feed) const {
+                                               const PhaseConfig& phase, const feed::Feed& feed) const {
     try {
       if (phase.objective == "encoders") {
         return std::make_unique<model::EncoderTrainer>(
             net, encoder_options(config_, phase, feed.species().size()), ranks_);
       }
-      return std::make_unique<model::Trainer>(net, smal::SmalBody(asset_, device_.device), priors_,
+      return std::make_unique<model::Trainer>(net, smal::tensors::SmalBody(asset_, device_.device), priors_,
                                               trainer_options(config_, phase), ranks_);
     } catch (const std::invalid_argument& error) {
-      throw ConfigError(fmt::format("phase \"{}\": {}", phase.name, error.what()));
+      throw run::ConfigError(fmt::format("phase \"{}\": {}", phase.name, error.what()));
     }
   }
 
   // The present phase, from the present step, to its end or until this call must stop.
   std::shared_ptr<model::PrimaNet> run_phase(const std::shared_ptr<model::PrimaNet>& from,
-                                             std::optional<TrainingLog>& log, Progress& progress,
+                                             std::optional<TrainingLog>& log, run::Progress& progress,
                                              TrainingSummary& summary) {
     const PhaseConfig& phase = config_.phases[static_cast<std::size_t>(position_.phase)];
     model::PrimaConfig sizes = from->config();
     sizes.ief_iterations = phase.ief_iterations;
     const auto net = model::with_config(*from, sizes);
     const int threads = options_.threads == 0 && place_.size > 1 ? own_cores(place_) : options_.threads;
-    const Feed feed = open_feed(config_, phase, position_.phase, threads, *ranks_);
+    const feed::Feed feed = open_feed(config_, phase, position_.phase, threads, *ranks_);
     const std::unique_ptr<model::Learner> learner = make_learner(net, phase, feed);
     if (stored_ && position_.step > 0) learner->restore(stored_->file);
     stored_.reset();
-    FeedStream stream(feed, position_.step * feed.batch_size(), config_.feed_ahead);
+    feed::FeedStream stream(feed, position_.step * feed.batch_size(), config_.feed_ahead);
     while (position_.step < phase.steps) {
       if (any_rank_interrupted()) {
         save(*learner);
-        throw Interrupted("interrupted");
+        throw run::Interrupted("interrupted");
       }
       if (limit_reached(summary)) break;
       step(phase, *learner, feed, stream.next(), log, summary);
@@ -360,8 +361,8 @@ class Run {
     return net;
   }
 
-  void step(const PhaseConfig& phase, model::Learner& learner, const Feed& feed, FeedBatch&& batch,
-            std::optional<TrainingLog>& log, TrainingSummary& summary) {
+  void step(const PhaseConfig& phase, model::Learner& learner, const feed::Feed& feed,
+            feed::FeedBatch&& batch, std::optional<TrainingLog>& log, TrainingSummary& summary) {
     const std::int64_t first_draw = batch.first_draw;
     torch::manual_seed(step_seed(config_, position_, ranks_->rank()));
     const model::StepReport report = learner.step(to_tensors(std::move(batch)));
@@ -399,7 +400,7 @@ class Run {
   fs::path write_model(const model::PrimaNet& net) const {
     const fs::path path = options_.out / "model.safetensors";
     if (!leads()) return path;
-    smal::NamedTensors tensors;
+    smal::tensors::NamedTensors tensors;
     model::append_parameters(tensors, "", net);
     if (config_.model_dtype == "float16") {
       for (auto& [name, tensor] : tensors) tensor = tensor.to(torch::kFloat16);
@@ -410,12 +411,12 @@ class Run {
 
   const TrainingOptions& options_;
   Clock::time_point start_ = Clock::now();
-  model::RankPlace place_;
+  model::ranks::RankPlace place_;
   model::DeviceChoice device_;
   TrainingConfig config_;
-  std::shared_ptr<const model::Collective> ranks_;
+  std::shared_ptr<const model::ranks::Collective> ranks_;
   std::unique_ptr<manifests::FolderLock> lock_;  // rank 0's
-  smal::SmalAsset asset_;
+  smal::tensors::SmalAsset asset_;
   model::Priors priors_;
   std::string key_;
   std::optional<StoredState> stored_;
@@ -428,4 +429,4 @@ TrainingSummary train(const TrainingConfig& config, const TrainingOptions& optio
   return Run(config, options).run();
 }
 
-}  // namespace q3d::pipeline
+}  // namespace q3d::pipeline::training

@@ -6,15 +6,15 @@
 #include <stdexcept>
 
 #include "model/checkpoint.h"
-#include "pipeline/errors.h"
+#include "pipeline/run/errors.h"
 
-namespace q3d::pipeline {
+namespace q3d::pipeline::training {
 namespace {
 
 constexpr const char* kPosition = "training_position";
 constexpr const char* kKey = "training_key";
 
-const std::string& entry(const smal::SafeTensors& file, const char* name) {
+const std::string& entry(const smal::tensors::SafeTensors& file, const char* name) {
   const auto found = file.metadata().find(name);
   if (found != file.metadata().end()) return found->second;
   throw std::runtime_error(
@@ -36,9 +36,9 @@ void save_state(const std::filesystem::path& path, const model::Learner& learner
 
 std::optional<StoredState> load_state(const std::filesystem::path& path, const std::string& key) {
   if (!std::filesystem::exists(path)) return std::nullopt;
-  StoredState state{smal::SafeTensors::open(path), {}};
+  StoredState state{smal::tensors::SafeTensors::open(path), {}};
   if (entry(state.file, kKey) != key) {
-    throw ConfigError(
+    throw run::ConfigError(
         fmt::format("{}: this run was begun with another configuration, other pools or other assets; give "
                     "another --out, or "
                     "remove the folder to begin again",
@@ -56,4 +56,4 @@ std::optional<StoredState> load_state(const std::filesystem::path& path, const s
   return state;
 }
 
-}  // namespace q3d::pipeline
+}  // namespace q3d::pipeline::training

@@ -8,9 +8,9 @@
 
 #include "model/learner.h"
 #include "pipeline/training/loss_watch.h"
-#include "smal/safetensors.h"
+#include "smal/tensors/safetensors.h"
 
-namespace q3d::pipeline {
+namespace q3d::pipeline::training {
 
 struct TrainingPosition {
   int phase = 0;          // the phase that is being trained; the number of phases when all are done
@@ -19,7 +19,7 @@ struct TrainingPosition {
 };
 
 struct StoredState {
-  smal::SafeTensors file;
+  smal::tensors::SafeTensors file;
   TrainingPosition position;
 };
 
@@ -31,4 +31,4 @@ void save_state(const std::filesystem::path& path, const model::Learner& learner
 // it is damaged.
 std::optional<StoredState> load_state(const std::filesystem::path& path, const std::string& key);
 
-}  // namespace q3d::pipeline
+}  // namespace q3d::pipeline::training

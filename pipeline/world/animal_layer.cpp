@@ -16,9 +16,9 @@ std::vector<Eigen::Vector3f> moved(std::span<const Eigen::Vector3f> points, cons
 }
 
 std::vector<Eigen::Vector3f> vertex_normals(std::span<const Eigen::Vector3f> vertices,
-                                            std::span<const Triangle> triangles) {
+                                            std::span<const render::Triangle> triangles) {
   std::vector<Eigen::Vector3f> normals(vertices.size(), Eigen::Vector3f::Zero());
-  for (const Triangle& t : triangles) {
+  for (const render::Triangle& t : triangles) {
     const Eigen::Vector3f normal = (vertices[t[1]] - vertices[t[0]]).cross(vertices[t[2]] - vertices[t[0]]);
     for (const std::uint32_t corner : t) normals[corner] += normal;
   }
@@ -52,11 +52,11 @@ Colour square_root(const Colour& linear) {
 struct AnimalLayer::Fragment {
   int row, column;
   float coverage;  // (0, 1]
-  SurfaceHit hit;
+  render::SurfaceHit hit;
   Eigen::Vector3f ray;
 };
 
-AnimalLayer::AnimalLayer(const RayDevice& device, const RestMesh& rest, const Body& body,
+AnimalLayer::AnimalLayer(const render::RayDevice& device, const RestMesh& rest, const Body& body,
                          const Eigen::Vector3f& translation)
     : rest_(rest),
       vertices_(moved(body.vertices, translation)),
@@ -72,7 +72,7 @@ std::vector<AnimalLayer::Fragment> AnimalLayer::fragments(cv::Size picture_px,
   for (int row = area.y; row < area.y + area.height; ++row) {
     for (int column = area.x; column < area.x + area.width; ++column) rays.push_back(camera.ray(column, row));
   }
-  std::vector<SurfaceHit> hits(rays.size());
+  std::vector<render::SurfaceHit> hits(rays.size());
   rays_.nearest(rays, hits);
 
   const auto found = [&](int row, int column) {
@@ -100,7 +100,7 @@ std::vector<AnimalLayer::Fragment> AnimalLayer::fragments(cv::Size picture_px,
       }
     }
   }
-  std::vector<SurfaceHit> sub_hits(sub_rays.size());
+  std::vector<render::SurfaceHit> sub_hits(sub_rays.size());
   rays_.nearest(sub_rays, sub_hits);
   for (std::size_t i = 0; i < outline.size(); ++i) {
     int covered = 0;
@@ -127,8 +127,8 @@ cv::Mat1b AnimalLayer::paint(cv::Mat& picture, const PictureCamera& camera, cons
   std::vector<Eigen::Vector3f> normals(pixels.size()), origins(pixels.size());
   std::vector<std::uint8_t> shadow(pixels.size());
   for (std::size_t i = 0; i < pixels.size(); ++i) {
-    const SurfaceHit& hit = pixels[i].hit;
-    const Triangle& t = rest_.triangles[hit.triangle];
+    const render::SurfaceHit& hit = pixels[i].hit;
+    const render::Triangle& t = rest_.triangles[hit.triangle];
     normals[i] = ((1.0F - hit.u - hit.v) * normals_[t[0]] + hit.u * normals_[t[1]] + hit.v * normals_[t[2]])
                      .normalized();
     origins[i] = hit.distance * pixels[i].ray + 0.015F * normals[i];
@@ -223,7 +223,7 @@ void AnimalLayer::cast_shadow(cv::Mat& picture, const PictureCamera& camera, con
 
 std::vector<std::uint8_t> AnimalLayer::hidden(std::span<const Eigen::Vector3f> points,
                                               std::span<const float> tolerance) const {
-  std::vector<SurfaceHit> hits(points.size());
+  std::vector<render::SurfaceHit> hits(points.size());
   rays_.nearest(points, hits);  // the direction to a point has the point's own length: it lies at distance 1
   std::vector<std::uint8_t> result(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {

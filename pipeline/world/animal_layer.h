@@ -5,9 +5,9 @@
 #include <span>
 #include <vector>
 
+#include "pipeline/render/rays.h"
 #include "pipeline/world/bodies.h"
 #include "pipeline/world/coat.h"
-#include "pipeline/world/rays.h"
 #include "pipeline/world/scene.h"
 
 namespace q3d::pipeline::world {
@@ -15,7 +15,7 @@ namespace q3d::pipeline::world {
 class AnimalLayer {
  public:
   // body + translation is where the animal stands in the camera's frame. rest and device must outlive this.
-  AnimalLayer(const RayDevice& device, const RestMesh& rest, const Body& body,
+  AnimalLayer(const render::RayDevice& device, const RestMesh& rest, const Body& body,
               const Eigen::Vector3f& translation);
 
   // Darkens the ground (picture: BGR, 8 bit) where the sun or most of the sky is behind the animal.
@@ -41,7 +41,7 @@ class AnimalLayer {
   const RestMesh& rest_;
   std::vector<Eigen::Vector3f> vertices_;
   std::vector<Eigen::Vector3f> normals_;
-  RayMesh rays_;
+  render::RayMesh rays_;
 };
 
 }  // namespace q3d::pipeline::world

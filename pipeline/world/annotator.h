@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
+#include "pipeline/run/random.h"
 #include "pipeline/world/landmarks.h"
-#include "pipeline/world/random.h"
 
 namespace q3d::pipeline::world {
 
@@ -37,6 +37,6 @@ struct Label {
 
 // One label a landmark. Swaps exchange the two sides of the fore legs, the hind legs, the face, or all.
 std::vector<Label> annotate(const std::vector<Landmark>& landmarks, std::span<const SeenLandmark> seen,
-                            double box_side_px, const LabelHabits& habits, Rng& rng);
+                            double box_side_px, const LabelHabits& habits, run::Rng& rng);
 
 }  // namespace q3d::pipeline::world

@@ -25,7 +25,7 @@ struct Painter {
   const PictureCamera& camera;
   const Ground& ground;
   const NoiseField& noise;
-  Rng& rng;
+  run::Rng& rng;
   float subject_distance;  // where the lens is focused
   cv::Mat picture;         // BGR, 8 bit
   cv::Mat1f distance;      // along the ray to the ground; -1 where there is none
@@ -145,7 +145,8 @@ cv::Scalar to_bgr(const Colour& colour) {
   return {scaled[2], scaled[1], scaled[0]};
 }
 
-void paint_blade(cv::Mat& picture, cv::Point2d foot_px, double length_px, const Colour& colour, Rng& rng) {
+void paint_blade(cv::Mat& picture, cv::Point2d foot_px, double length_px, const Colour& colour,
+                 run::Rng& rng) {
   constexpr int kShift = 4;  // sixteenths of a pixel
   const double lean = rng.normal(0.0, 0.35);
   const cv::Point2d tip = foot_px + cv::Point2d(lean, -1.0) * length_px;
@@ -156,7 +157,7 @@ void paint_blade(cv::Mat& picture, cv::Point2d foot_px, double length_px, const 
 }
 
 cv::Mat paint_backdrop(const Backdrop& backdrop, cv::Size size_px, const PictureCamera& camera,
-                       const Ground& ground, float subject_distance, const NoiseField& noise, Rng& rng) {
+                       const Ground& ground, float subject_distance, const NoiseField& noise, run::Rng& rng) {
   Painter painter{backdrop,
                   camera,
                   ground,

@@ -1,15 +1,15 @@
 #include "pipeline/world/bodies.h"
 
+#include "pipeline/animal/synthetic_quadruped.h"
+#include "pipeline/animal/synthetic_shapes.h"
 #include "pipeline/world/shape_space.h"
-#include "smal/body.h"
-#include "smal/rotation.h"
-#include "smal/synthetic_quadruped.h"
-#include "smal/synthetic_shapes.h"
+#include "smal/tensors/body.h"
+#include "smal/tensors/rotation.h"
 
 namespace q3d::pipeline::world {
 namespace {
 
-RestMesh rest_of(const smal::SmalAsset& asset) {
+RestMesh rest_of(const smal::tensors::SmalAsset& asset) {
   RestMesh rest;
   const auto vertices = asset.v_template.accessor<float, 2>();
   const auto faces = asset.faces.accessor<std::int32_t, 2>();
@@ -32,10 +32,10 @@ RestMesh rest_of(const smal::SmalAsset& asset) {
   return rest;
 }
 
-ShapeSpace shapes_of(const RestMesh& rest, const smal::SmalAsset& asset) {
+ShapeSpace shapes_of(const RestMesh& rest, const smal::tensors::SmalAsset& asset) {
   using RowMajor = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   const auto directions = asset.shapedirs.contiguous();
-  const smal::ShapeSpace& space = smal::synthetic_shape_space();
+  const animal::ShapeSpace& space = animal::synthetic_shape_space();
   return {rest,
           Eigen::Map<const RowMajor>(directions.const_data_ptr<float>(), 3 * directions.size(0), kBodyBetas)
               .cast<double>(),
@@ -46,14 +46,14 @@ ShapeSpace shapes_of(const RestMesh& rest, const smal::SmalAsset& asset) {
 }  // namespace
 
 struct BodyModel::Model {
-  smal::SmalBody body;
+  smal::tensors::SmalBody body;
   RestMesh rest;
   ShapeSpace shapes;
-  explicit Model(const smal::SmalAsset& asset)
+  explicit Model(const smal::tensors::SmalAsset& asset)
       : body(asset), rest(rest_of(asset)), shapes(shapes_of(rest, asset)) {}
 };
 
-BodyModel::BodyModel() : model_(std::make_unique<Model>(smal::make_synthetic_quadruped())) {}
+BodyModel::BodyModel() : model_(std::make_unique<Model>(animal::make_synthetic_quadruped())) {}
 BodyModel::~BodyModel() = default;
 
 const RestMesh& BodyModel::rest() const {
@@ -64,7 +64,7 @@ const ShapeSpace& BodyModel::shapes() const {
 }
 
 void BodyModel::save(const std::filesystem::path& asset) const {
-  smal::save_asset(asset, model_->body.asset());
+  smal::tensors::save_asset(asset, model_->body.asset());
 }
 
 std::vector<Body> BodyModel::pose(std::span<const Posture> postures) const {
@@ -77,7 +77,7 @@ std::vector<Body> BodyModel::pose(std::span<const Posture> postures) const {
     std::copy(posture.pose.begin(), posture.pose.end(), pose.mutable_data_ptr<float>() + i * 3 * kBodyJoints);
     std::copy(posture.betas.begin(), posture.betas.end(), betas.mutable_data_ptr<float>() + i * kBodyBetas);
   }
-  const auto output = model_->body.forward(smal::axis_angle_to_matrix_exact(pose), betas);
+  const auto output = model_->body.forward(smal::tensors::axis_angle_to_matrix_exact(pose), betas);
   const auto vertices = output.vertices.contiguous();
   const auto keypoints = output.keypoints.contiguous();
   const auto* vertex = reinterpret_cast<const Eigen::Vector3f*>(vertices.const_data_ptr<float>());

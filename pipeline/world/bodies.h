@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "pipeline/world/rays.h"
+#include "pipeline/render/rays.h"
 
 namespace q3d::pipeline::world {
 
@@ -32,7 +32,7 @@ struct Body {
 // The mesh at rest: x to the head, y up, z to the animal's right.
 struct RestMesh {
   std::vector<Eigen::Vector3f> vertices;
-  std::vector<Triangle> triangles;
+  std::vector<render::Triangle> triangles;
   std::vector<std::array<float, kBodyJoints>> skinning;  // weights of each vertex, sum 1
   std::array<std::vector<int>, kBodyKeypoints> keypoint_vertices;
 };

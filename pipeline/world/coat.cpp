@@ -34,7 +34,7 @@ float share(const std::array<float, kBodyJoints>& skinning, const JointRange (&p
 
 std::vector<Eigen::Vector3f> rest_normals(const RestMesh& rest) {
   std::vector<Eigen::Vector3f> normals(rest.vertices.size(), Eigen::Vector3f::Zero());
-  for (const Triangle& t : rest.triangles) {
+  for (const render::Triangle& t : rest.triangles) {
     const Eigen::Vector3f& a = rest.vertices[t[0]];
     const Eigen::Vector3f normal = (rest.vertices[t[1]] - a).cross(rest.vertices[t[2]] - a);
     for (const std::uint32_t corner : t) normals[corner] += normal;
@@ -97,7 +97,7 @@ CoatPainter::CoatPainter(const RestMesh& rest, const NoiseField& noise) : noise_
   }
 }
 
-BodyZone CoatPainter::zone(const Triangle& triangle, float u, float v) const {
+BodyZone CoatPainter::zone(const render::Triangle& triangle, float u, float v) const {
   const float w = 1.0F - u - v;
   const BodyZone &a = zones_[triangle[0]], &b = zones_[triangle[1]], &c = zones_[triangle[2]];
   const auto mix = [&](float BodyZone::*field) { return w * a.*field + u * b.*field + v * c.*field; };

@@ -5,9 +5,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "pipeline/run/random.h"
 #include "pipeline/world/bodies.h"
 #include "pipeline/world/noise.h"
-#include "pipeline/world/random.h"
 #include "pipeline/world/scene.h"
 
 namespace q3d::pipeline::world {
@@ -46,7 +46,7 @@ class CoatPainter {
  public:
   CoatPainter(const RestMesh& rest, const NoiseField& noise);
 
-  BodyZone zone(const Triangle& triangle, float u, float v) const;  // u, v as in SurfaceHit
+  BodyZone zone(const render::Triangle& triangle, float u, float v) const;  // u, v as in SurfaceHit
   // The colour there in linear light; individual shifts the markings from animal to animal.
   Colour albedo(const Coat& coat, const BodyZone& zone, const Eigen::Vector3f& individual) const;
   // 1 on the wet surfaces of eyes and nose.

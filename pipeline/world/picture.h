@@ -7,13 +7,13 @@
 #include <span>
 #include <vector>
 
+#include "pipeline/render/rays.h"
 #include "pipeline/world/annotator.h"
 #include "pipeline/world/bodies.h"
 #include "pipeline/world/coat.h"
 #include "pipeline/world/framing.h"
 #include "pipeline/world/noise.h"
 #include "pipeline/world/plan.h"
-#include "pipeline/world/rays.h"
 #include "pipeline/world/subject.h"
 
 namespace q3d::pipeline::world {
@@ -49,12 +49,12 @@ class PictureRenderer {
 
  private:
   Picture render_one(const PicturePlan& plan, const Subject& subject, const Body& body) const;
-  Rng stream(const PicturePlan& plan, std::uint64_t purpose) const;
+  run::Rng stream(const PicturePlan& plan, std::uint64_t purpose) const;
 
   std::uint64_t seed_;
   int picture_px_;
   BodyModel model_;
-  RayDevice device_;
+  render::RayDevice device_;
   NoiseField noise_;
   CoatPainter painter_;
   std::array<std::vector<Landmark>, kSets> landmarks_;

@@ -5,8 +5,8 @@
 #include <array>
 #include <vector>
 
+#include "pipeline/run/random.h"
 #include "pipeline/world/bodies.h"
-#include "pipeline/world/random.h"
 #include "pipeline/world/species.h"
 
 namespace q3d::pipeline::world {
@@ -23,7 +23,7 @@ class ShapeSpace {
   Eigen::VectorXd typical(const Species& species) const;
 
   // An individual: about the typical one, at half the family's deviations.
-  std::array<float, kBodyBetas> draw(const Species& species, Rng& rng) const;
+  std::array<float, kBodyBetas> draw(const Species& species, run::Rng& rng) const;
 
  private:
   struct Length {  // of a body part: the distance of two groups of vertices

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <random>
 
-#include "smal/synthetic_motion.h"
+#include "pipeline/animal/synthetic_motion.h"
 
 namespace q3d::pipeline::world {
 namespace {
@@ -27,7 +27,7 @@ bool is_leg(int joint) {
 // to the right.
 class Posing {
  public:
-  Posing(Stance& stance, Rng& rng) : stance_(stance), rng_(rng) {}
+  Posing(Stance& stance, run::Rng& rng) : stance_(stance), rng_(rng) {}
 
   void turn(int joint, int axis, double degrees) {
     stance_.pose[static_cast<std::size_t>(3 * joint + axis)] += static_cast<float>(degrees * kDegree);
@@ -45,13 +45,13 @@ class Posing {
 
  private:
   Stance& stance_;
-  Rng& rng_;
+  run::Rng& rng_;
 };
 
 void Posing::add_motion(double spread, bool legs) {
-  static const smal::MotionModel kModel = smal::synthetic_motion();
+  static const animal::MotionModel kModel = animal::synthetic_motion();
   std::mt19937_64 random(rng_.next());
-  Eigen::VectorXd pose = kModel.mean + spread * (smal::sample_motion(kModel, random) - kModel.mean);
+  Eigen::VectorXd pose = kModel.mean + spread * (animal::sample_motion(kModel, random) - kModel.mean);
   pose = pose.cwiseMax(kModel.lower).cwiseMin(kModel.upper);
   for (int joint = 1; joint < kBodyJoints; ++joint) {
     if (is_leg(joint) && !legs) continue;
@@ -89,7 +89,7 @@ void rear(Stance& stance, Posing& posing) {
   posing.bend(kNeck, -0.4 * up);
 }
 
-void leap(Stance& stance, Posing& posing, Rng& rng) {
+void leap(Stance& stance, Posing& posing, run::Rng& rng) {
   stance.pitch = posing.about(8.0, 12.0) * kDegree;
   stance.lift = rng.uniform(0.1, 0.5);
   for (int side = 0; side < 2; ++side) {
@@ -98,7 +98,7 @@ void leap(Stance& stance, Posing& posing, Rng& rng) {
   }
 }
 
-void roll_over(Stance& stance, Posing& posing, Rng& rng) {
+void roll_over(Stance& stance, Posing& posing, run::Rng& rng) {
   stance.roll = (rng.chance(0.5) ? 1.0 : -1.0) * rng.uniform(65.0, 150.0) * kDegree;
   for (int side = 0; side < 2; ++side) {
     posing.leg(kForeLegs[side], {posing.about(5.0, 18.0), 30.0, -45.0, -10.0}, 12.0);
@@ -116,7 +116,7 @@ void bow(Stance& stance, Posing& posing) {
   posing.bend(kNeck, 0.8 * down);
 }
 
-void extreme(Stance& stance, Posing& posing, Rng& rng) {
+void extreme(Stance& stance, Posing& posing, run::Rng& rng) {
   switch (rng.below(4)) {
     case 0:
       return rear(stance, posing);
@@ -131,7 +131,7 @@ void extreme(Stance& stance, Posing& posing, Rng& rng) {
 
 }  // namespace
 
-Stance draw_stance(const StanceHabits& habits, Rng& rng) {
+Stance draw_stance(const StanceHabits& habits, run::Rng& rng) {
   constexpr double kCalm = 0.6;  // a resting or straining animal's back, neck and tail move less
   Stance stance;
   Posing posing(stance, rng);

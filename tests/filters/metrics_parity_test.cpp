@@ -6,9 +6,9 @@
 #include <nlohmann/json.hpp>
 
 #include "filters/metrics.h"
-#include "smal/body.h"
-#include "smal/rotation.h"
-#include "smal/safetensors.h"
+#include "smal/tensors/body.h"
+#include "smal/tensors/rotation.h"
+#include "smal/tensors/safetensors.h"
 #include "tests/support/parity_smal.h"
 #include "tests/support/paths.h"
 
@@ -36,7 +36,8 @@ std::span<const float> view(const torch::Tensor& tensor) {
 class MetricsParity : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    file_ = new smal::SafeTensors(smal::SafeTensors::open(testing::parity_dir() / "metrics.safetensors"));
+    file_ = new smal::tensors::SafeTensors(
+        smal::tensors::SafeTensors::open(testing::parity_dir() / "metrics.safetensors"));
     std::ifstream stream(testing::parity_dir() / "metrics.json");
     cases_ = nlohmann::json::parse(stream).at("meta").at("cases").get<std::vector<std::string>>();
   }
@@ -67,17 +68,17 @@ class MetricsParity : public ::testing::Test {
   }
   // (cases, V, 3): the evaluator's own body.
   static torch::Tensor true_vertices() {
-    const smal::SmalBody body(testing::load_parity_asset(testing::parity_dir()));
+    const smal::tensors::SmalBody body(testing::load_parity_asset(testing::parity_dir()));
     const torch::Tensor axis_angle = torch::cat({golden("smal_global_orient"), golden("smal_pose")}, 1);
     const torch::Tensor rotations =
-        smal::axis_angle_to_matrix_exact(axis_angle.reshape({axis_angle.size(0), -1, 3}));
+        smal::tensors::axis_angle_to_matrix_exact(axis_angle.reshape({axis_angle.size(0), -1, 3}));
     return body.forward(rotations, golden("smal_betas"), golden("smal_transl")).vertices;
   }
   static torch::Tensor predicted_vertices() {
     return golden("pred_vertices_i16").to(torch::kFloat32) * std::ldexp(1.0, -11);
   }
 
-  static inline smal::SafeTensors* file_ = nullptr;
+  static inline smal::tensors::SafeTensors* file_ = nullptr;
   static inline std::vector<std::string> cases_;
 };
 

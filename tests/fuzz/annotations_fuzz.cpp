@@ -3,7 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "loaders/dataset.h"
+#include "loaders/formats/dataset.h"
 #include "manifests/record_json.h"
 #include "tests/fuzz/fuzz_input.h"
 
@@ -55,12 +55,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   require(has_pictures, "pictures are there");
   const auto file = scratch.write("train.json", q3d::fuzz::as_text(data, size));
   for (const char* format : {"prima", "superanimal", "animal_kingdom", "coco"}) {
-    q3d::loaders::DatasetOptions options{.name = "set",
-                                         .format = format,
-                                         .split = "train",
-                                         .root = scratch.root(),
-                                         .annotations = "train.json",
-                                         .images = {}};
+    q3d::loaders::formats::DatasetOptions options{.name = "set",
+                                                  .format = format,
+                                                  .split = "train",
+                                                  .root = scratch.root(),
+                                                  .annotations = "train.json",
+                                                  .images = {}};
     if (options.format == "coco") options.topology = topology;
     q3d::fuzz::value_or_refusal(file, [&] {
       std::set<std::string> ids;

@@ -1,5 +1,5 @@
 // Weights: every tensor of an accepted file lies in its mapping.
-#include "smal/safetensors.h"
+#include "smal/tensors/safetensors.h"
 #include "tests/fuzz/fuzz_input.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -7,7 +7,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   static const q3d::fuzz::Scratch scratch;
   const auto path = scratch.write("weights.safetensors", q3d::fuzz::as_text(data, size));
   q3d::fuzz::value_or_refusal(path, [&] {
-    const q3d::smal::SafeTensors file = q3d::smal::SafeTensors::open(path);
+    const q3d::smal::tensors::SafeTensors file = q3d::smal::tensors::SafeTensors::open(path);
     std::size_t bytes = 0;
     for (const std::string& name : file.names()) {
       const torch::Tensor tensor = file.tensor(name);

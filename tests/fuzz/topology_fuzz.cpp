@@ -1,5 +1,5 @@
 // Topology files: what is accepted maps mirrored keypoints onto mirrored ones.
-#include "loaders/topology_file.h"
+#include "loaders/keypoints/topology_file.h"
 #include "tests/fuzz/fuzz_input.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -7,7 +7,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   static const q3d::fuzz::Scratch scratch;
   const auto file = scratch.write("topology.json", q3d::fuzz::as_text(data, size));
   q3d::fuzz::value_or_refusal(file, [&] {
-    const q3d::loaders::Topology topology = q3d::loaders::read_topology_file(file);
+    const q3d::loaders::keypoints::Topology topology = q3d::loaders::keypoints::read_topology_file(file);
     const std::size_t count = topology.keypoints.size();
     require(count > 0 && topology.flip.size() == count && topology.weights.size() == count,
             "every keypoint has a mirror image and a weight");

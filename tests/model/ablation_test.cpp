@@ -22,7 +22,7 @@ class Ablation : public ::testing::Test {
   std::shared_ptr<PrimaNet> build(const PrimaConfig& config) {
     const auto path = scratch_.path() / "net.safetensors";
     write_initial_checkpoint(path, config, /*seed=*/9);
-    const smal::SafeTensors file = smal::SafeTensors::open(path);
+    const smal::tensors::SafeTensors file = smal::tensors::SafeTensors::open(path);
     EXPECT_EQ(checkpoint_config(file), config);
     auto net = std::make_shared<PrimaNet>(config);
     const torch::NoGradGuard no_grad;

@@ -31,7 +31,7 @@ class Checkpoint : public ::testing::Test {
  protected:
   Checkpoint() {
     write_initial_checkpoint(good_, config_, 7);
-    const auto file = smal::SafeTensors::open(good_);
+    const auto file = smal::tensors::SafeTensors::open(good_);
     for (const std::string& name : file.names()) tensors_[name] = file.tensor(name).clone();
   }
 
@@ -42,7 +42,7 @@ class Checkpoint : public ::testing::Test {
   }
 
   std::shared_ptr<PrimaNet> load(const std::filesystem::path& path) const {
-    const auto file = smal::SafeTensors::open(path);
+    const auto file = smal::tensors::SafeTensors::open(path);
     return load_net(file, checkpoint_config(file), asset(), {});
   }
 
@@ -55,8 +55,8 @@ class Checkpoint : public ::testing::Test {
     return "";
   }
 
-  static const smal::SmalAsset& asset() {
-    static const smal::SmalAsset loaded = testing::load_parity_asset(testing::parity_dir());
+  static const smal::tensors::SmalAsset& asset() {
+    static const smal::tensors::SmalAsset loaded = testing::load_parity_asset(testing::parity_dir());
     return loaded;
   }
 
@@ -131,11 +131,11 @@ TEST_F(Checkpoint, HalfPrecisionFilesAreCast) {
 
 TEST_F(Checkpoint, FilesWithoutSizesAreRefused) {
   const std::filesystem::path path = scratch_.path() / "bare.safetensors";
-  smal::write_safetensors(path, {{"x", torch::zeros({1})}});
-  EXPECT_THROW(checkpoint_config(smal::SafeTensors::open(path)), std::runtime_error);
-  smal::write_safetensors(path, {{"x", torch::zeros({1})}}, {{"prima_config", "{\"depht\": 2}"}});
+  smal::tensors::write_safetensors(path, {{"x", torch::zeros({1})}});
+  EXPECT_THROW(checkpoint_config(smal::tensors::SafeTensors::open(path)), std::runtime_error);
+  smal::tensors::write_safetensors(path, {{"x", torch::zeros({1})}}, {{"prima_config", "{\"depht\": 2}"}});
   try {
-    checkpoint_config(smal::SafeTensors::open(path));
+    checkpoint_config(smal::tensors::SafeTensors::open(path));
     FAIL();
   } catch (const std::runtime_error& error) {
     EXPECT_TRUE(mentions(error.what(), "did you mean 'depth'")) << error.what();

@@ -5,7 +5,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "smal/rotation.h"
+#include "smal/tensors/rotation.h"
 #include "tests/model/parity_net.h"
 #include "tests/support/paths.h"
 
@@ -13,7 +13,7 @@ namespace q3d::model {
 namespace {
 
 // The golden weights: int8 times a power of two.
-void load_golden(Discriminator& discriminator, const smal::SafeTensors& file) {
+void load_golden(Discriminator& discriminator, const smal::tensors::SafeTensors& file) {
   std::ifstream stream(testing::parity_dir() / "discriminator.json");
   const nlohmann::json scales = nlohmann::json::parse(stream).at("meta").at("scales");
   const torch::NoGradGuard no_grad;
@@ -27,14 +27,15 @@ void load_golden(Discriminator& discriminator, const smal::SafeTensors& file) {
 }
 
 TEST(DiscriminatorParity, ScoresAndLosses) {
-  const smal::SafeTensors file = testing::parity_file("discriminator");
+  const smal::tensors::SafeTensors file = testing::parity_file("discriminator");
   Discriminator discriminator;
   load_golden(discriminator, file);
   const torch::NoGradGuard no_grad;
   const torch::Tensor predicted =
       discriminator.forward(file.tensor("pose").view({-1, 34, 3, 3}), file.tensor("betas"));
   testing::expect_close("out_fake", predicted, file.tensor("out_fake"), 1e-6);
-  const torch::Tensor rotations = smal::axis_angle_to_matrix(file.tensor("gt_pose_aa").view({-1, 34, 3}));
+  const torch::Tensor rotations =
+      smal::tensors::axis_angle_to_matrix(file.tensor("gt_pose_aa").view({-1, 34, 3}));
   const torch::Tensor real = discriminator.forward(rotations, file.tensor("gt_betas"));
   testing::expect_close("out_real", real, file.tensor("out_real"), 1e-6);
   const double adversarial = file.tensor("loss_adv").item<double>();

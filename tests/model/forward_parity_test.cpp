@@ -61,7 +61,7 @@ class ForwardParity : public ::testing::TestWithParam<std::string> {
   }
 
   Prima prima_;
-  smal::SafeTensors golden_;
+  smal::tensors::SafeTensors golden_;
   torch::Tensor images_;
 };
 
@@ -115,7 +115,7 @@ TEST_P(ForwardParity, OneByOneAsInABatch) {
 // bfloat16 has 8 bits of mantissa; matrices alone are rounded, so outputs agree to about a percent.
 TEST_P(ForwardParity, BFloat16IsNearFloat32) {
   const Prediction exact = prima_.predict(prima_.encode(images_));
-  const smal::SmalAsset& asset = prima_.body().asset();
+  const smal::tensors::SmalAsset& asset = prima_.body().asset();
   auto net = load_net(testing::parity_file("weights_" + GetParam()), prima_.config(), asset,
                       {torch::kCPU, torch::kBFloat16});
   net->eval();
@@ -133,7 +133,7 @@ TEST(BioClipParity, QuickGelu) {
   const std::string name = "bioclip_feature_quick_gelu";
   int compared = 0;
   for (const std::string which : {"A", "B"}) {
-    const smal::SafeTensors golden = testing::parity_file("forward_" + which);
+    const smal::tensors::SafeTensors golden = testing::parity_file("forward_" + which);
     if (!golden.contains(name)) continue;
     PrimaConfig config = testing::parity_config(which);
     config.clip_quick_gelu = true;

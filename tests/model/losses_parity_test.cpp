@@ -17,7 +17,7 @@
 #include "model/assemble.h"
 #include "model/net.h"
 #include "model/optimiser.h"
-#include "smal/rotation.h"
+#include "smal/tensors/rotation.h"
 #include "tests/model/parity_net.h"
 #include "tests/support/paths.h"
 
@@ -26,13 +26,13 @@ namespace {
 
 using testing::parity_file;
 
-Targets targets_of(const smal::SafeTensors& file, torch::ScalarType dtype) {
+Targets targets_of(const smal::tensors::SafeTensors& file, torch::ScalarType dtype) {
   Targets targets;
   targets.keypoints_2d = file.tensor("batch_keypoints_2d");
   targets.keypoints_3d = file.tensor("batch_keypoints_3d");
   const torch::Tensor axis_angle =
       torch::cat({file.tensor("batch_smal_global_orient"), file.tensor("batch_smal_pose")}, 1);
-  targets.rotations = smal::axis_angle_to_matrix(axis_angle.unflatten(1, {35, 3}).to(dtype));
+  targets.rotations = smal::tensors::axis_angle_to_matrix(axis_angle.unflatten(1, {35, 3}).to(dtype));
   targets.betas = file.tensor("batch_smal_betas");
   targets.has_pose = file.tensor("batch_has_pose");
   targets.has_betas = file.tensor("batch_has_betas");
@@ -161,7 +161,7 @@ class LossesParity : public ::testing::TestWithParam<std::string> {
   PrimaConfig config_;
   Prima prima_;
   std::vector<ParameterGroup> groups_;
-  smal::SafeTensors file_;
+  smal::tensors::SafeTensors file_;
   nlohmann::json meta_;
   Priors priors_;
   Targets targets_;

@@ -7,7 +7,8 @@
 
 #include "model/decoder.h"
 #include "model/discriminator.h"
-#include "smal/synthetic_prior.h"
+#include "pipeline/animal/synthetic_files.h"
+#include "pipeline/animal/synthetic_prior.h"
 #include "tests/support/paths.h"
 
 namespace q3d::model {
@@ -65,15 +66,15 @@ TEST(ShapePrior, UsesTheFamilyOrTheNearest) {
 
 TEST(Priors, OfTheSyntheticQuadrupedSurviveTheDiskAndKnowTheirOwn) {
   const testing::ScratchDir scratch;
-  save_priors(scratch.path() / "priors", synthetic_priors());
-  const Priors priors = load_priors(smal::SafeTensors::open(scratch.path() / "priors"), torch::kCPU);
+  save_priors(scratch.path() / "priors", pipeline::animal::synthetic_priors());
+  const Priors priors = load_priors(smal::tensors::SafeTensors::open(scratch.path() / "priors"), torch::kCPU);
   std::mt19937_64 random(4);
   std::vector<torch::Tensor> poses, betas;
   std::vector<std::int64_t> families;
   for (int i = 0; i < 500; ++i) {
-    poses.push_back(smal::sample_pose(random).flatten());
+    poses.push_back(pipeline::animal::sample_pose(random).flatten());
     families.push_back(i % 5);
-    betas.push_back(smal::sample_betas(i % 5, random));
+    betas.push_back(pipeline::animal::sample_betas(i % 5, random));
   }
   const torch::Tensor none = torch::zeros({500});
   const torch::Tensor family = torch::tensor(families, torch::kInt64);

@@ -61,11 +61,11 @@ TEST(AdamW, StateSurvivesTheDiskBitForBit) {
     whole.step(0.01);
     half.step(0.01);
   }
-  smal::NamedTensors state;
+  smal::tensors::NamedTensors state;
   half.append_state(state, "optimiser.");
-  smal::write_safetensors(path, state);
+  smal::tensors::write_safetensors(path, state);
   AdamW restored(resumed.groups(), {});
-  restored.restore_state(smal::SafeTensors::open(path), "optimiser.");
+  restored.restore_state(smal::tensors::SafeTensors::open(path), "optimiser.");
   for (int step = 3; step < 6; ++step) {
     straight.set_gradients(step);
     resumed.set_gradients(step);
@@ -80,9 +80,9 @@ TEST(AdamW, AMissingTensorIsNamed) {
   const testing::ScratchDir scratch;
   Problem problem(5);
   AdamW optimiser(problem.groups(), {});
-  smal::write_safetensors(scratch.path() / "s", {{"first.exp_avg", torch::zeros({7, 3})}});
+  smal::tensors::write_safetensors(scratch.path() / "s", {{"first.exp_avg", torch::zeros({7, 3})}});
   try {
-    optimiser.restore_state(smal::SafeTensors::open(scratch.path() / "s"), "");
+    optimiser.restore_state(smal::tensors::SafeTensors::open(scratch.path() / "s"), "");
     FAIL();
   } catch (const std::runtime_error& error) {
     EXPECT_THAT(error.what(), ::testing::HasSubstr("first.exp_avg_sq"));

@@ -13,8 +13,8 @@
 
 namespace q3d::testing {
 
-smal::SafeTensors parity_file(const std::string& name) {
-  return smal::SafeTensors::open(parity_dir() / (name + ".safetensors"));
+smal::tensors::SafeTensors parity_file(const std::string& name) {
+  return smal::tensors::SafeTensors::open(parity_dir() / (name + ".safetensors"));
 }
 
 model::PrimaConfig parity_config(const std::string& which) {
@@ -23,7 +23,7 @@ model::PrimaConfig parity_config(const std::string& which) {
   if (!stream) throw std::runtime_error(path.string() + ": cannot open");
   const nlohmann::json meta = nlohmann::json::parse(stream).at("meta");
   const nlohmann::json& sizes = meta.at("config");
-  const smal::SafeTensors weights = parity_file("weights_" + which);
+  const smal::tensors::SafeTensors weights = parity_file("weights_" + which);
   const auto rows = [&](const std::string& name) { return weights.tensor(name).size(0); };
 
   model::PrimaConfig config;
@@ -51,11 +51,11 @@ model::Prima parity_prima(const std::string& which) {
 model::Prima parity_prima(const std::string& which, const model::PrimaConfig& config,
                           torch::ScalarType dtype) {
   model::configure_compute(1);  // a network this small only loses time to a second thread
-  const smal::SmalAsset asset = load_parity_asset(parity_dir());
+  const smal::tensors::SmalAsset asset = load_parity_asset(parity_dir());
   auto net = model::load_net(parity_file("weights_" + which), config, asset, {torch::kCPU, dtype});
   net->eval();
   for (auto& parameter : net->parameters()) parameter.set_requires_grad(false);
-  return {net, smal::SmalBody(asset).to_dtype(dtype)};
+  return {net, smal::tensors::SmalBody(asset).to_dtype(dtype)};
 }
 
 torch::Tensor parity_images(const model::Prima& prima, const torch::Tensor& index) {

@@ -7,7 +7,7 @@
 
 #include "model/checkpoint.h"
 #include "model/prima.h"
-#include "smal/safetensors.h"
+#include "smal/tensors/safetensors.h"
 
 namespace q3d::testing {
 
@@ -20,7 +20,7 @@ model::Prima parity_prima(const std::string& which);
 model::Prima parity_prima(const std::string& which, const model::PrimaConfig& config,
                           torch::ScalarType dtype = torch::kFloat32);  // float64: the body too
 
-smal::SafeTensors parity_file(const std::string& name);
+smal::tensors::SafeTensors parity_file(const std::string& name);
 
 // inputs.images_u8[index], through Prima::normalise.
 torch::Tensor parity_images(const model::Prima& prima, const torch::Tensor& index);

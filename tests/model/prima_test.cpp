@@ -18,7 +18,7 @@ class PrimaTest : public ::testing::Test {
  protected:
   PrimaTest() {
     configure_compute(1);
-    smal::save_asset(body_, testing::load_parity_asset(testing::parity_dir()));
+    smal::tensors::save_asset(body_, testing::load_parity_asset(testing::parity_dir()));
   }
 
   Prima seeded(const PrimaConfig& config, torch::ScalarType dtype = torch::kFloat32) const {

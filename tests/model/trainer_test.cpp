@@ -7,8 +7,8 @@
 
 #include "model/checkpoint.h"
 #include "model/device.h"
-#include "smal/camera.h"
-#include "smal/rotation.h"
+#include "smal/tensors/camera.h"
+#include "smal/tensors/rotation.h"
 #include "tests/support/parity_smal.h"
 #include "tests/support/paths.h"
 
@@ -25,19 +25,19 @@ PrimaConfig small_config() {
 }
 
 // Noise for pictures, and a seeded body of the golden asset to be found in them.
-TrainingBatch seeded_batch(const smal::SmalBody& body, std::uint64_t seed) {
+TrainingBatch seeded_batch(const smal::tensors::SmalBody& body, std::uint64_t seed) {
   torch::manual_seed(seed);
   constexpr std::int64_t kBatch = 3;
   TrainingBatch batch;
   batch.images = torch::randn({kBatch, 3, 256, 256});
   Targets& targets = batch.targets;
-  targets.rotations = smal::axis_angle_to_matrix_exact(0.3 * torch::randn({kBatch, 35, 3}));
+  targets.rotations = smal::tensors::axis_angle_to_matrix_exact(0.3 * torch::randn({kBatch, 35, 3}));
   targets.betas = 0.2 * torch::randn({kBatch, kBetas});
   const torch::Tensor keypoints = body.keypoints(targets.rotations, targets.betas);
   const torch::Tensor translation = torch::tensor({0.0F, 0.0F, 9.0F}).expand({kBatch, 3});
   const torch::Tensor seen = torch::ones({kBatch, 26, 1});
   targets.keypoints_3d = torch::cat({keypoints, seen}, 2);
-  targets.keypoints_2d = torch::cat({smal::project_to_crop(keypoints, translation), seen}, 2);
+  targets.keypoints_2d = torch::cat({smal::tensors::project_to_crop(keypoints, translation), seen}, 2);
   targets.has_pose = torch::tensor({1.0F, 0.0F, 1.0F});
   targets.has_betas = torch::tensor({1.0F, 0.0F, 1.0F});
   targets.family = torch::tensor({0, -1, 4}, torch::kInt64);
@@ -50,13 +50,13 @@ class TrainerTest : public ::testing::Test {
     configure_compute(1);
     const auto path = scratch_.path() / "net.safetensors";
     write_initial_checkpoint(path, small_config(), /*seed=*/3);
-    checkpoint_.emplace(smal::SafeTensors::open(path));
-    priors_ =
-        load_priors(smal::SafeTensors::open(testing::parity_dir() / "weights_A.safetensors"), torch::kCPU);
+    checkpoint_.emplace(smal::tensors::SafeTensors::open(path));
+    priors_ = load_priors(smal::tensors::SafeTensors::open(testing::parity_dir() / "weights_A.safetensors"),
+                          torch::kCPU);
   }
 
-  static const smal::SmalAsset& asset() {
-    static const smal::SmalAsset golden = testing::load_parity_asset(testing::parity_dir());
+  static const smal::tensors::SmalAsset& asset() {
+    static const smal::tensors::SmalAsset golden = testing::load_parity_asset(testing::parity_dir());
     return golden;
   }
 
@@ -77,8 +77,8 @@ class TrainerTest : public ::testing::Test {
   }
 
   testing::ScratchDir scratch_;
-  smal::SmalBody body_;
-  std::optional<smal::SafeTensors> checkpoint_;
+  smal::tensors::SmalBody body_;
+  std::optional<smal::tensors::SafeTensors> checkpoint_;
   Priors priors_;
 };
 
@@ -159,12 +159,12 @@ TEST_F(TrainerTest, GoesOnBitForBitFromASavedState) {
   train(straight, 2, 4);
 
   Trainer resumed = trainer(quick());
-  resumed.restore(smal::SafeTensors::open(path));
+  resumed.restore(smal::tensors::SafeTensors::open(path));
   EXPECT_EQ(resumed.steps(), 2);
   train(resumed, 2, 4);
   EXPECT_TRUE(same(weights(straight), weights(resumed)));
   // The state is a checkpoint too.
-  EXPECT_NO_THROW(load_net(smal::SafeTensors::open(path), small_config(), asset(), {}));
+  EXPECT_NO_THROW(load_net(smal::tensors::SafeTensors::open(path), small_config(), asset(), {}));
 }
 
 TEST_F(TrainerTest, Bfloat16IsCloseAndLeavesFloat32Weights) {

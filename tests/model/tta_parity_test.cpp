@@ -18,7 +18,7 @@ namespace {
 using testing::expect_close;
 
 struct Golden {
-  smal::SafeTensors file;
+  smal::tensors::SafeTensors file;
   Prima prima;
   ImageFeatures features;
   torch::Tensor keypoints;
@@ -29,7 +29,7 @@ const Golden& golden(const std::string& which) {
   const auto known = cache.find(which);
   if (known != cache.end()) return known->second;
   const Prima prima = testing::parity_prima(which);
-  const smal::SafeTensors file = testing::parity_file("tta_" + which);
+  const smal::tensors::SafeTensors file = testing::parity_file("tta_" + which);
   const torch::Tensor images = testing::parity_images(prima, file.tensor("input_index"));
   return cache.emplace(which, Golden{file, prima, prima.encode(images), file.tensor("gt_keypoints")})
       .first->second;

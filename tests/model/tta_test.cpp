@@ -19,7 +19,7 @@ constexpr double kBatchNoise = 2e-4;  // of rotations, after some steps at a lar
 
 struct Samples {
   Prima prima = testing::parity_prima("A");
-  smal::SafeTensors file = testing::parity_file("tta_A");
+  smal::tensors::SafeTensors file = testing::parity_file("tta_A");
   ImageFeatures features = prima.encode(testing::parity_images(prima, file.tensor("input_index")));
   torch::Tensor keypoints = file.tensor("gt_keypoints").clone();
 };

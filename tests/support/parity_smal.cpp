@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
-#include "smal/safetensors.h"
+#include "smal/tensors/safetensors.h"
 
 namespace q3d::testing {
 namespace {
@@ -28,15 +28,15 @@ std::vector<std::vector<std::int64_t>> split_groups(const torch::Tensor& flat, c
 
 }  // namespace
 
-smal::SmalAsset load_parity_asset(const std::filesystem::path& folder) {
-  const auto file = smal::SafeTensors::open(folder / "smal_asset.safetensors");
+smal::tensors::SmalAsset load_parity_asset(const std::filesystem::path& folder) {
+  const auto file = smal::tensors::SafeTensors::open(folder / "smal_asset.safetensors");
   const nlohmann::json meta = read_meta(folder / "smal_asset.json");
   const auto scaled = [&](const char* tensor, const char* scale) {
     return file.tensor(tensor).to(torch::kFloat32) * meta.at(scale).get<float>();
   };
   const auto index = [&file](const char* tensor) { return file.tensor(tensor).to(torch::kInt64); };
 
-  smal::SmalAsset asset;
+  smal::tensors::SmalAsset asset;
   asset.name = "golden numbers";
   asset.v_template = file.tensor("v_template");
   asset.faces = file.tensor("faces").to(torch::kInt32);

@@ -4,7 +4,7 @@
 
 #include <fstream>
 
-#include "pipeline/errors.h"
+#include "pipeline/run/errors.h"
 #include "tests/support/paths.h"
 
 namespace q3d::pipeline::evaluation {
@@ -31,7 +31,7 @@ class EvaluationConfigFile : public ::testing::Test {
     try {
       load(document);
       FAIL() << expected;
-    } catch (const ConfigError& error) {
+    } catch (const run::ConfigError& error) {
       EXPECT_NE(std::string(error.what()).find(expected), std::string::npos) << error.what();
     }
   }

@@ -5,7 +5,10 @@
 #include <cmath>
 #include <numbers>
 
-#include "pipeline/network.h"
+#include "pipeline/animal/synthetic_files.h"
+#include "pipeline/device/network.h"
+#include "pipeline/network/torch_bodies.h"
+#include "smal/axis_angle.h"
 #include "tests/support/paths.h"
 
 namespace q3d::pipeline::evaluation {
@@ -19,7 +22,7 @@ double value(const MetricValues& values, Metric metric) {
 
 // Ten visible keypoints on a line and sixteen hidden ones, predicted exactly.
 struct Exact {
-  BodyPrediction body;
+  device::BodyPrediction body;
   Target target;
   Exact() {
     for (std::size_t k = 0; k < manifests::kNumKeypoints; ++k) {
@@ -110,8 +113,9 @@ TEST(MeanOf, LeavesOutWhatIsMissingOrCountsItAsZero) {
 // A body whose truth is given as axis-angles must find its own mesh again; another shape must not.
 TEST(AddTrueMeshes, TheTrueBodyHasNoError) {
   const testing::ScratchDir scratch;
-  write_synthetic_asset(scratch.path() / "smal.safetensors");
-  const BodyMeshes meshes(scratch.path() / "smal.safetensors");
+  animal::write_synthetic_asset(scratch.path() / "smal.safetensors");
+  const std::unique_ptr<device::BodyMeshes> meshes =
+      network::load_body_meshes(scratch.path() / "smal.safetensors");
   manifests::SampleRecord record;
   record.truth.emplace();
   record.truth->has_pose = record.truth->has_betas = true;
@@ -122,16 +126,16 @@ TEST(AddTrueMeshes, TheTrueBodyHasNoError) {
   record.truth->betas[3] = -0.5F;
   const manifests::SampleRecord* pointer = &record;
   Target target = make_target(record, 0.0);
-  add_true_meshes(std::span(&pointer, 1), meshes, std::span(&target, 1));
+  add_true_meshes(std::span(&pointer, 1), *meshes, std::span(&target, 1));
   ASSERT_FALSE(target.vertices.empty());
   ASSERT_TRUE(target.keypoints_3d.has_value()) << "the record has none, so the body gives them";
 
-  BodyPrediction body;
-  body.rotations = rotation_matrices(record.truth->pose_axis_angle);
+  device::BodyPrediction body;
+  body.rotations = smal::rotation_matrices(record.truth->pose_axis_angle);
   body.betas = record.truth->betas;
   const auto error = [&] {
-    const BodyShape shape{body.rotations, body.betas};
-    const BodyMesh mesh = meshes.pose(std::span(&shape, 1)).front();
+    const device::BodyShape shape{body.rotations, body.betas};
+    const device::BodyMesh mesh = meshes->pose(std::span(&shape, 1)).front();
     body.keypoints_3d = mesh.keypoints_3d;
     return measure(body, &mesh, target);
   };
@@ -145,7 +149,7 @@ TEST(AddTrueMeshes, TheTrueBodyHasNoError) {
 TEST(RotationMatrices, AQuarterTurnAboutZ) {
   std::array<float, manifests::kNumJoints * 3> axis_angle{};
   axis_angle[3 * 4 + 2] = static_cast<float>(std::numbers::pi / 2);
-  const auto matrices = rotation_matrices(axis_angle);
+  const auto matrices = smal::rotation_matrices(axis_angle);
   const std::array<float, 9> quarter{0, -1, 0, 1, 0, 0, 0, 0, 1};
   const std::array<float, 9> identity{1, 0, 0, 0, 1, 0, 0, 0, 1};
   for (std::size_t i = 0; i < 9; ++i) {

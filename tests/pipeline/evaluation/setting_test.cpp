@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "pipeline/errors.h"
+#include "pipeline/run/errors.h"
 
 namespace q3d::pipeline::evaluation {
 namespace {
@@ -44,20 +44,20 @@ TEST(PlanSettings, SharesAndCurveFollowTheFullAdaptation) {
 }
 
 TEST(PlanSettings, RefusesWhatHasNoMeaning) {
-  EXPECT_THROW(plan_settings({.tta_iterations = -1}), ConfigError);
-  EXPECT_THROW(plan_settings({.curve = {-1}}), ConfigError);
-  EXPECT_THROW(plan_settings({.tta_iterations = 10, .visible_shares = {0.0}}), ConfigError);
-  EXPECT_THROW(plan_settings({.tta_iterations = 10, .visible_shares = {1.5}}), ConfigError);
-  EXPECT_THROW(plan_settings({.visible_shares = {0.5}}), ConfigError);
+  EXPECT_THROW(plan_settings({.tta_iterations = -1}), run::ConfigError);
+  EXPECT_THROW(plan_settings({.curve = {-1}}), run::ConfigError);
+  EXPECT_THROW(plan_settings({.tta_iterations = 10, .visible_shares = {0.0}}), run::ConfigError);
+  EXPECT_THROW(plan_settings({.tta_iterations = 10, .visible_shares = {1.5}}), run::ConfigError);
+  EXPECT_THROW(plan_settings({.visible_shares = {0.5}}), run::ConfigError);
 }
 
-CropKeypoints with_visible(std::size_t count) {
-  CropKeypoints keypoints{};
+device::CropKeypoints with_visible(std::size_t count) {
+  device::CropKeypoints keypoints{};
   for (std::size_t k = 0; k < count; ++k) keypoints[3 * k + 2] = 1.0F;
   return keypoints;
 }
 
-std::vector<std::size_t> visible(const CropKeypoints& keypoints) {
+std::vector<std::size_t> visible(const device::CropKeypoints& keypoints) {
   std::vector<std::size_t> result;
   for (std::size_t k = 0; k < manifests::kNumKeypoints; ++k) {
     if (keypoints[3 * k + 2] > 0.0F) result.push_back(k);
@@ -67,7 +67,7 @@ std::vector<std::size_t> visible(const CropKeypoints& keypoints) {
 
 // The paper's case: of 22 keypoints, 70, 50 and 30 % are 16, 11 and 7.
 TEST(HideKeypoints, RoundsUpAsThePaperDoes) {
-  const CropKeypoints all = with_visible(22);
+  const device::CropKeypoints all = with_visible(22);
   EXPECT_EQ(hide_keypoints(all, 1.0, 0, "a"), all);
   EXPECT_EQ(visible(hide_keypoints(all, 0.7, 0, "a")).size(), 16U);
   EXPECT_EQ(visible(hide_keypoints(all, 0.5, 0, "a")).size(), 11U);
@@ -86,7 +86,7 @@ TEST(HideKeypoints, ASmallerShareIsPartOfALargerOne) {
 }
 
 TEST(HideKeypoints, SeedAndSampleDecide) {
-  const CropKeypoints all = with_visible(22);
+  const device::CropKeypoints all = with_visible(22);
   const auto chosen = visible(hide_keypoints(all, 0.5, 3, "a"));
   EXPECT_EQ(chosen, visible(hide_keypoints(all, 0.5, 3, "a")));
   EXPECT_NE(chosen, visible(hide_keypoints(all, 0.5, 4, "a")));

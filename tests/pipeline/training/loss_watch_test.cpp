@@ -4,7 +4,7 @@
 
 #include <limits>
 
-namespace q3d::pipeline {
+namespace q3d::pipeline::training {
 namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
@@ -31,4 +31,4 @@ TEST(LossWatch, AllowsAWildStart) {
 }
 
 }  // namespace
-}  // namespace q3d::pipeline
+}  // namespace q3d::pipeline::training

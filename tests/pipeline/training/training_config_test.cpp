@@ -4,10 +4,10 @@
 
 #include <fstream>
 
-#include "pipeline/errors.h"
+#include "pipeline/run/errors.h"
 #include "tests/support/paths.h"
 
-namespace q3d::pipeline {
+namespace q3d::pipeline::training {
 namespace {
 
 using nlohmann::json;
@@ -50,7 +50,7 @@ TEST(TrainingConfig, ReadsEveryKey) {
   EXPECT_EQ(config.phases[1].pools[1].shards.size(), 2U);
   EXPECT_EQ(config.feed.batch, 4);
   EXPECT_FALSE(config.feed.augment);
-  EXPECT_EQ(config.feed.keypoint_weight, KeypointWeight::raw_v);
+  EXPECT_EQ(config.feed.keypoint_weight, feed::KeypointWeight::raw_v);
   EXPECT_DOUBLE_EQ(config.feed.augmentation.colour, 0.3);
   EXPECT_DOUBLE_EQ(config.loss_weights.contrastive, 8.0);
   EXPECT_EQ(config.loss_variant, model::LossVariant::official);
@@ -92,7 +92,7 @@ TEST_P(BrokenTrainingConfig, IsRefusedWithTheReason) {
   try {
     parse_training_config(config, "t", "1");
     FAIL() << "accepted " << GetParam().pointer << " = " << GetParam().value;
-  } catch (const ConfigError& error) {
+  } catch (const run::ConfigError& error) {
     EXPECT_NE(std::string(error.what()).find(GetParam().expected), std::string::npos) << error.what();
   }
 }
@@ -136,7 +136,7 @@ TEST(TrainingConfig, AMissingPartIsNamed) {
     try {
       parse_training_config(config, "t", "1");
       FAIL() << key;
-    } catch (const ConfigError& error) {
+    } catch (const run::ConfigError& error) {
       EXPECT_NE(std::string(error.what()).find(std::string("\"") + key + "\" is missing"), std::string::npos)
           << error.what();
     }
@@ -157,4 +157,4 @@ TEST(TrainingConfig, PathsAreRelativeToTheirFile) {
 }
 
 }  // namespace
-}  // namespace q3d::pipeline
+}  // namespace q3d::pipeline::training

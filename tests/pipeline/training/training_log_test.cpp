@@ -8,7 +8,7 @@
 #include "manifests/atomic_file.h"
 #include "tests/support/paths.h"
 
-namespace q3d::pipeline {
+namespace q3d::pipeline::training {
 namespace {
 
 std::vector<nlohmann::json> lines(const std::filesystem::path& path) {
@@ -54,4 +54,4 @@ TEST(TrainingLog, ABadPathIsNamed) {
 }
 
 }  // namespace
-}  // namespace q3d::pipeline
+}  // namespace q3d::pipeline::training

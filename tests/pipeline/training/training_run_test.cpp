@@ -9,13 +9,13 @@
 #include "manifests/atomic_file.h"
 #include "model/checkpoint.h"
 #include "model/prima.h"
-#include "pipeline/errors.h"
-#include "smal/asset.h"
-#include "tests/pipeline/training/sample_shards.h"
+#include "pipeline/run/errors.h"
+#include "smal/tensors/asset.h"
+#include "tests/pipeline/feed/sample_shards.h"
 #include "tests/support/parity_smal.h"
 #include "tests/support/paths.h"
 
-namespace q3d::pipeline {
+namespace q3d::pipeline::training {
 namespace {
 
 using ::testing::HasSubstr;
@@ -29,7 +29,7 @@ class TrainingRun : public ::testing::Test {
     sizes.dec_dim = 32, sizes.dec_heads = 2, sizes.dec_ffn = 32;
     sizes.drop_path = 0.3;
     model::write_initial_checkpoint(path("initial"), sizes, 3);
-    smal::save_asset(path("asset"), testing::load_parity_asset(testing::parity_dir()));
+    smal::tensors::save_asset(path("asset"), testing::load_parity_asset(testing::parity_dir()));
     testing::write_sample_shard(path("first.h5"), "first", 5, 10);
     testing::write_sample_shard(path("second.h5"), "second", 7, 40);
     config_.network.initial = path("initial");
@@ -82,8 +82,8 @@ TEST_F(TrainingRun, EncodersAreTrainedAloneAndResume) {
   const TrainingSummary straight = run("straight");
   run("stopped", 1);
   EXPECT_EQ(manifests::read_file(straight.model), manifests::read_file(run("stopped").model));
-  const smal::SafeTensors before = smal::SafeTensors::open(path("initial"));
-  const smal::SafeTensors after = smal::SafeTensors::open(straight.model);
+  const smal::tensors::SafeTensors before = smal::tensors::SafeTensors::open(path("initial"));
+  const smal::tensors::SafeTensors after = smal::tensors::SafeTensors::open(straight.model);
   for (const std::string& name : before.names()) {
     const bool encoder =
         name.starts_with("backbone.") || name.starts_with("bioclip_embedding.species_model.");
@@ -95,7 +95,7 @@ TEST_F(TrainingRun, OneSpeciesCannotBeTold) {
   testing::write_sample_shard(path("single.h5"), "single", 1, 1);
   config_.phases = {
       {"encoders", "encoders", {{"single", {path("single.h5")}, 1.0}}, 4, 1, false, 1e-3, 0, "linear"}};
-  EXPECT_THROW(run("out"), ConfigError);
+  EXPECT_THROW(run("out"), run::ConfigError);
 }
 
 TEST_F(TrainingRun, AKilledRunRepeatsStepsAfterItsNewestState) {
@@ -121,8 +121,8 @@ TEST_F(TrainingRun, TheWeightsLoadAsACheckpoint) {
   const TrainingSummary summary = run("out");
   const model::Prima prima = model::Prima::load(summary.model, path("asset"), torch::kCPU);
   EXPECT_EQ(prima.config().ief_iterations, 1);
-  const smal::SafeTensors before = smal::SafeTensors::open(path("initial"));
-  const smal::SafeTensors after = smal::SafeTensors::open(summary.model);
+  const smal::tensors::SafeTensors before = smal::tensors::SafeTensors::open(path("initial"));
+  const smal::tensors::SafeTensors after = smal::tensors::SafeTensors::open(summary.model);
   EXPECT_FALSE(
       torch::equal(before.tensor("smal_head.decpose.2.weight"), after.tensor("smal_head.decpose.2.weight")));
   EXPECT_NO_THROW(model::Prima::load(path("out/state.safetensors"), path("asset"), torch::kCPU));
@@ -139,21 +139,22 @@ TEST_F(TrainingRun, AFinishedRunHasNothingToDo) {
 TEST_F(TrainingRun, AnotherConfigurationNeedsAnotherFolder) {
   run("out", 1);
   config_.phases[0].learning_rate = 1e-4;
-  EXPECT_THROW(run("out"), ConfigError);
+  EXPECT_THROW(run("out"), run::ConfigError);
 }
 
 TEST_F(TrainingRun, EncodersMayComeFromAnotherCheckpoint) {
-  model::PrimaConfig sizes = model::checkpoint_config(smal::SafeTensors::open(path("initial")));
+  model::PrimaConfig sizes = model::checkpoint_config(smal::tensors::SafeTensors::open(path("initial")));
   model::write_initial_checkpoint(path("other"), sizes, 99);
   config_.network.encoders = path("other");
-  const smal::SafeTensors after = smal::SafeTensors::open(run("out").model);
+  const smal::tensors::SafeTensors after = smal::tensors::SafeTensors::open(run("out").model);
   const std::string frozen = "bioclip_embedding.species_model.visual.conv1.weight";
-  EXPECT_TRUE(torch::equal(after.tensor(frozen), smal::SafeTensors::open(path("other")).tensor(frozen)));
+  EXPECT_TRUE(
+      torch::equal(after.tensor(frozen), smal::tensors::SafeTensors::open(path("other")).tensor(frozen)));
 }
 
 TEST_F(TrainingRun, AnAblationTravelsWithTheWeights) {
   config_.network.without = {"initial_betas", "keypoint_tokens"};
-  const auto sizes = model::checkpoint_config(smal::SafeTensors::open(run("out").model));
+  const auto sizes = model::checkpoint_config(smal::tensors::SafeTensors::open(run("out").model));
   EXPECT_FALSE(sizes.betas_from_bio);
   EXPECT_FALSE(sizes.keypoint_tokens);
   EXPECT_FALSE(sizes.learn_bio_encoder);
@@ -161,12 +162,12 @@ TEST_F(TrainingRun, AnAblationTravelsWithTheWeights) {
 
 TEST_F(TrainingRun, WithoutBioFeaturesTheBioEncoderStartsAnewAndLearns) {
   const std::string bio = "bioclip_embedding.species_model.visual.conv1.weight";
-  const smal::SafeTensors initial = smal::SafeTensors::open(path("initial"));
+  const smal::tensors::SafeTensors initial = smal::tensors::SafeTensors::open(path("initial"));
   model::write_initial_checkpoint(path("other"), model::checkpoint_config(initial), 99);
   config_.network.encoders = path("other");
   config_.network.without = {"bio_features"};
   run("none", 0);
-  const smal::SafeTensors after = smal::SafeTensors::open(path("none/model.safetensors"));
+  const smal::tensors::SafeTensors after = smal::tensors::SafeTensors::open(path("none/model.safetensors"));
   const double from_initial = (after.tensor(bio) - initial.tensor(bio)).abs().max().item<double>();
   EXPECT_GT(from_initial, 0.0);
   EXPECT_LT(from_initial, 0.02);  // six steps of at most 1e-3, and weight decay
@@ -190,4 +191,4 @@ TEST_F(TrainingRun, ALossThatIsNotFiniteNamesTheSamples) {
 }
 
 }  // namespace
-}  // namespace q3d::pipeline
+}  // namespace q3d::pipeline::training

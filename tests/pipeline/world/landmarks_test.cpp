@@ -2,13 +2,13 @@
 
 #include <gtest/gtest.h>
 
-#include "loaders/topology.h"
+#include "loaders/keypoints/topology.h"
 
 namespace q3d::pipeline::world {
 namespace {
 
 // The loaders' tables were written independently of ours.
-void expect_topology(const std::vector<Landmark>& landmarks, const loaders::Topology& topology) {
+void expect_topology(const std::vector<Landmark>& landmarks, const loaders::keypoints::Topology& topology) {
   ASSERT_EQ(landmarks.size(), topology.keypoints.size());
   for (std::size_t i = 0; i < landmarks.size(); ++i) {
     EXPECT_EQ(landmarks[i].name, topology.keypoints[i]) << i;
@@ -31,9 +31,9 @@ class Landmarks : public ::testing::Test {
 
 TEST_F(Landmarks, NamesMirrorsAndMapsAgreeWithTheLoaders) {
   const RestMesh& rest = model().rest();
-  expect_topology(animal3d_landmarks(rest), loaders::topology("animal3d26"));
-  expect_topology(superanimal_landmarks(rest), loaders::topology("superanimal_quadruped39"));
-  expect_topology(animal_kingdom_landmarks(rest), loaders::topology("animal_kingdom23"));
+  expect_topology(animal3d_landmarks(rest), loaders::keypoints::topology("animal3d26"));
+  expect_topology(superanimal_landmarks(rest), loaders::keypoints::topology("superanimal_quadruped39"));
+  expect_topology(animal_kingdom_landmarks(rest), loaders::keypoints::topology("animal_kingdom23"));
 }
 
 TEST_F(Landmarks, MirrorPartnersLieOnOppositeSidesOfTheRestingBody) {

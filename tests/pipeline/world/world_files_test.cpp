@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
-#include "loaders/dataset.h"
+#include "loaders/formats/dataset.h"
 #include "manifests/atomic_file.h"
 #include "pipeline/world/world.h"
 #include "tests/support/paths.h"
@@ -268,7 +268,7 @@ TEST_F(WorldFiles, AnimalKingdomBoxesAreTight) {
 }
 
 TEST_F(WorldFiles, LoadersReadEveryRecord) {
-  const std::vector<loaders::DatasetOptions> sets{
+  const std::vector<loaders::formats::DatasetOptions> sets{
       {"a", "prima", "train", out() / "animal3d", "train.json", {}},
       {"c", "prima", "test", out() / "control_animal3dlatest", "test.json", {}},
       {"s", "superanimal", "train", out() / "superanimal_quadruped", "annotations/train.json", "images"},
@@ -277,7 +277,7 @@ TEST_F(WorldFiles, LoadersReadEveryRecord) {
   const std::vector<std::string> names{"animal3d/train", "control_animal3dlatest/test",
                                        "superanimal_quadruped/train", "animal_kingdom/test"};
   for (std::size_t i = 0; i < sets.size(); ++i) {
-    const loaders::Dataset dataset = loaders::load_dataset(sets[i]);
+    const loaders::formats::Dataset dataset = loaders::formats::load_dataset(sets[i]);
     EXPECT_EQ(static_cast<int>(dataset.records.size()), summary_->pictures.at(names[i]));
     for (const manifests::SampleRecord& record : dataset.records) {
       EXPECT_EQ(record.failure, manifests::Reason::none) << record.id << ": " << record.failure_detail;

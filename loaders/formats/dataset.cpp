@@ -1,0 +1,120 @@
+#include "loaders/formats/dataset.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <stdexcept>
+#include <utility>
+
+#include "loaders/formats/formats.h"
+#include "loaders/pictures/box.h"
+
+namespace q3d::loaders::formats {
+namespace {
+
+using manifests::Family;
+using manifests::Reason;
+using manifests::SampleRecord;
+
+using Parser = Dataset (*)(const DatasetOptions&);
+constexpr std::array<std::pair<const char*, Parser>, 5> kParsers{{{"prima", load_prima},
+                                                                  {"superanimal", load_superanimal},
+                                                                  {"animal_kingdom", load_animal_kingdom},
+                                                                  {"coco", load_coco_labels},
+                                                                  {"deeplabcut", load_deeplabcut}}};
+
+// Name and split are the first two parts of sample ids and must stay tellable from the rest.
+void require_id_part(const std::string& part, const char* option) {
+  const bool is_usable = !part.empty() && part.find_first_of("/#\\") == std::string::npos &&
+                         std::none_of(part.begin(), part.end(), [](unsigned char c) { return c < 0x20; });
+  if (!is_usable) {
+    throw std::invalid_argument(
+        fmt::format("dataset {}: got \"{}\", expected a text without /, \\ and #", option, part));
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> dataset_formats() {
+  std::vector<std::string> names;
+  for (const auto& [name, parser] : kParsers) names.emplace_back(name);
+  return names;
+}
+
+Dataset load_dataset(const DatasetOptions& options) {
+  require_id_part(options.name, "name");
+  require_id_part(options.split, "split");
+  std::string known;
+  for (const auto& [name, parser] : kParsers) {
+    if (options.format == name) return parser(options);
+    known += fmt::format("{}{}", known.empty() ? "" : ", ", name);
+  }
+  throw std::invalid_argument(
+      fmt::format("dataset {}: format: got \"{}\", expected one of {}", options.name, options.format, known));
+}
+
+Loading::Loading(const DatasetOptions& dataset_options, const std::filesystem::path& default_images)
+    : options(dataset_options),
+      file(dataset_options.root / dataset_options.annotations),
+      finder(dataset_options.root, dataset_options.images, default_images) {}
+
+void set_picture(Loading& loading, RecordReader& reader, const std::string& name, const std::string& field,
+                 const std::string& annotation, SampleRecord& sample) {
+  sample.dataset = loading.options.name;
+  sample.split = loading.options.split;
+  sample.image_ref = name;
+  sample.id = fmt::format("{}/{}/{}#{}", sample.dataset, sample.split, id_part(name), annotation);
+  if (reader.failed()) return;
+  FoundPicture found = loading.finder.find(name);
+  if (found.failure == Reason::none) {
+    sample.image_path = found.path.string();
+  } else {
+    reader.fail(found.failure, field, found.got, "a picture below the dataset's root");
+  }
+}
+
+void check_box(RecordReader& reader, const std::string& field, const SampleRecord& sample) {
+  if (reader.failed()) return;
+  if (const auto problem = pictures::find_box_problem(sample.box, sample.width_px, sample.height_px)) {
+    reader.fail(problem->reason, field, problem->got, problem->expected);
+  }
+}
+
+void check_visible(RecordReader& reader, const std::string& field, const SampleRecord& sample) {
+  const bool any = std::any_of(sample.keypoints.begin(), sample.keypoints.end(),
+                               [](const manifests::Keypoint& point) { return point.weight > 0.0F; });
+  if (any) return;
+  reader.fail(Reason::no_visible_keypoints, field, "v <= 0 throughout the 26", "a labelled keypoint");
+}
+
+void set_family(Loading& loading, std::optional<Family> stated, std::optional<Family> from_table,
+                SampleRecord& sample) {
+  sample.family = stated ? *stated : from_table.value_or(Family::none);
+  if (stated && from_table && *stated != *from_table) {
+    loading.notes.count(
+        fmt::format("species \"{}\" is {} in the file and {} in the table (the file's is kept)",
+                    sample.species, manifests::to_string(*stated), manifests::to_string(*from_table)),
+        sample.id);
+  }
+  if (!stated && !from_table && !sample.species.empty()) {
+    loading.notes.count(
+        fmt::format("species \"{}\" is not in the family table (family none)", sample.species), sample.id);
+  }
+}
+
+Dataset finished(Loading& loading, std::vector<SampleRecord> records) {
+  const auto note = [&](const char* text, std::size_t count) {
+    if (count > 0) loading.notes.add(fmt::format("{}: {}", text, count));
+  };
+  const PictureFinder& finder = loading.finder;
+  note("absolute names of another disk, found by their last parts", finder.found_by_tail());
+  note("of these, names for a file that another of them names too (one must be wrong)",
+       finder.shared_files());
+  note("picture names that differ from the file's in letter case, '+' or .jpeg", finder.found_by_spelling());
+  std::vector<std::filesystem::path> files{loading.file};
+  files.insert(files.end(), loading.more_files.begin(), loading.more_files.end());
+  return {std::move(records), loading.notes.list(), std::move(files)};
+}
+
+}  // namespace q3d::loaders::formats

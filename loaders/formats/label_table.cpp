@@ -1,0 +1,58 @@
+#include "loaders/formats/label_table.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <fstream>
+#include <stdexcept>
+#include <string_view>
+#include <utility>
+
+namespace q3d::loaders::formats {
+
+bool is_hdf5(const std::filesystem::path& file) {
+  constexpr std::string_view kSignature = "\x89HDF\r\n\x1a\n";
+  std::array<char, kSignature.size()> start{};
+  std::ifstream stream(file, std::ios::binary);
+  if (!std::filesystem::is_regular_file(file) || !stream) {
+    throw std::runtime_error(
+        fmt::format("{}: got nothing that can be read, expected DeepLabCut's .h5 or .csv", file.string()));
+  }
+  stream.read(start.data(), start.size());
+  return stream && std::string_view(start.data(), start.size()) == kSignature;
+}
+
+LabelTable read_label_table(const std::filesystem::path& file) {
+  return is_hdf5(file) ? read_label_hdf5(file) : read_label_csv(file);
+}
+
+LabelColumn label_column(std::vector<std::string> names, const std::string& where) {
+  constexpr std::array<std::string_view, 3> kCoordinates{"x", "y", "likelihood"};
+  if (names.size() != 3 && names.size() != 4) {
+    throw std::runtime_error(
+        fmt::format("{}: got {} levels of column names ({}), expected scorer, bodyparts, coords, with "
+                    "individuals between "
+                    "the first two or without",
+                    where, names.size(), fmt::join(names, ", ")));
+  }
+  LabelColumn column;
+  column.scorer = std::move(names.front());
+  if (names.size() == 4) column.individual = std::move(names[1]);
+  column.bodypart = std::move(names[names.size() - 2]);
+  column.coordinate = std::move(names.back());
+  if (std::find(kCoordinates.begin(), kCoordinates.end(), column.coordinate) == kCoordinates.end()) {
+    throw std::runtime_error(
+        fmt::format("{}: coords: got \"{}\", expected x, y or likelihood", where, column.coordinate));
+  }
+  return column;
+}
+
+std::string row_name(const std::vector<std::string>& parts) {
+  std::string name = fmt::format("{}", fmt::join(parts, "/"));
+  std::replace(name.begin(), name.end(), '\\', '/');
+  return name;
+}
+
+}  // namespace q3d::loaders::formats

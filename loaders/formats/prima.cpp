@@ -1,0 +1,129 @@
+// The JSON of PRIMA and AniMer: {"data": [{img_path, mask_path, bbox, keypoint_2d, ...}, ...]}.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "loaders/formats/formats.h"
+#include "manifests/json_file.h"
+
+namespace q3d::loaders::formats {
+namespace {
+
+using manifests::BodyTruth;
+using manifests::Family;
+using manifests::Reason;
+using manifests::SampleRecord;
+
+constexpr std::size_t kKeypoints = manifests::kNumKeypoints;
+constexpr std::size_t kPoseNumbers = manifests::kNumJoints * 3;
+constexpr std::size_t kBetas = manifests::kNumBetas;
+constexpr std::size_t kFirstBetas = 20;  // `shape`; the other 21 are `shape_extra`
+
+// `values` come from a reader that has checked their number; they fit.
+template <std::size_t N>
+void copy_into(std::array<float, N>& target, const std::vector<double>& values, std::size_t at = 0) {
+  std::transform(values.begin(), values.end(), target.begin() + static_cast<std::ptrdiff_t>(at),
+                 [](double value) { return static_cast<float>(value); });
+}
+
+template <std::size_t N>
+bool any_nonzero(const std::array<float, N>& values) {
+  return std::any_of(values.begin(), values.end(), [](float value) { return value != 0.0F; });
+}
+
+// `shape` holds all 41 numbers, or 20 with the other 21 in `shape_extra`, which some exports lack.
+void read_betas(const nlohmann::json& record, RecordReader& reader, Loading& loading, const std::string& id,
+                BodyTruth& truth) {
+  if (!reader.has("shape")) return;
+  const bool is_whole = record["shape"].is_array() && record["shape"].size() == kBetas;
+  copy_into(truth.betas, reader.finite_numbers("shape", is_whole ? kBetas : kFirstBetas, 1));
+  if (is_whole) return;
+  if (reader.has("shape_extra")) {
+    copy_into(truth.betas, reader.finite_numbers("shape_extra", kBetas - kFirstBetas, 1), kFirstBetas);
+  } else {
+    loading.notes.count("shape has 20 numbers and there is no shape_extra (the other 21 betas are 0)", id);
+  }
+}
+
+// Truth is what is not all zero: converters write zeros for pictures without a body.
+std::optional<BodyTruth> read_truth(const nlohmann::json& record, RecordReader& reader, Loading& loading,
+                                    const std::string& id) {
+  BodyTruth truth;
+  if (reader.has("pose")) copy_into(truth.pose_axis_angle, reader.finite_numbers("pose", kPoseNumbers, 1));
+  read_betas(record, reader, loading, id, truth);
+  if (reader.has("trans")) copy_into(truth.trans, reader.finite_numbers("trans", 3, 1));
+  if (reader.has("keypoint_3d")) {
+    copy_into(truth.keypoints_3d, reader.numbers("keypoint_3d", kKeypoints, 3, Reason::keypoints_missing,
+                                                 Reason::keypoints_wrong_length));
+    if (std::any_of(truth.keypoints_3d.begin(), truth.keypoints_3d.end(),
+                    [](float value) { return !std::isfinite(value); })) {
+      reader.fail(Reason::keypoints_not_finite, "keypoint_3d", "a number that is not finite",
+                  "finite numbers");
+    }
+  }
+  truth.has_pose = any_nonzero(truth.pose_axis_angle);
+  truth.has_betas = any_nonzero(truth.betas);
+  truth.has_keypoints_3d = any_nonzero(truth.keypoints_3d);
+  if (!truth.has_pose && !truth.has_betas && !truth.has_keypoints_3d) return std::nullopt;
+  return truth;
+}
+
+// -1 and nothing at all both mean "not stated".
+std::optional<Family> read_family(RecordReader& reader) {
+  const auto number = reader.integer("supercategory");
+  if (!number || *number == -1) return std::nullopt;
+  if (*number >= 0 && *number <= static_cast<int>(Family::hippopotamidae))
+    return static_cast<Family>(*number);
+  reader.fail(Reason::record_malformed, "supercategory", std::to_string(*number),
+              "a family from 0 to 4, or -1");
+  return std::nullopt;
+}
+
+// A mask that is not there, or is the picture itself (as the official AcinoSet converter writes it), is none.
+void set_mask(RecordReader& reader, Loading& loading, SampleRecord& sample) {
+  const std::string name = reader.optional_text("mask_path");
+  if (name.empty() || reader.failed()) return;
+  FoundPicture mask = loading.finder.find(name);
+  if (mask.failure == Reason::none && mask.path == sample.image_path) {
+    loading.notes.count("mask_path names the picture itself (no mask)", sample.id);
+  } else if (mask.failure == Reason::none) {
+    sample.mask_path = mask.path.string();
+  } else if (mask.failure == Reason::image_missing) {
+    loading.notes.count("mask_path names a file that is not there (no mask)", sample.id);
+  } else {
+    reader.fail(mask.failure, "mask_path", mask.got, "a mask below the dataset's root");
+  }
+}
+
+SampleRecord read_record(const nlohmann::json& record, std::size_t index, Loading& loading) {
+  SampleRecord sample;
+  RecordReader reader(record, fmt::format("{}: data[{}]", loading.file.string(), index), sample);
+  set_picture(loading, reader, reader.text("img_path"), "img_path", std::to_string(index), sample);
+  set_mask(reader, loading, sample);
+  sample.width_px = reader.size_px("width");
+  sample.height_px = reader.size_px("height");
+  sample.box = reader.box("bbox");
+  check_box(reader, "bbox", sample);
+  const auto keypoints = reader.keypoints("keypoint_2d", kKeypoints);
+  std::copy(keypoints.begin(), keypoints.end(), sample.keypoints.begin());
+  check_visible(reader, "keypoint_2d", sample);
+  sample.truth = read_truth(record, reader, loading, sample.id);
+  sample.species = species::species_of_picture(sample.image_ref, "");
+  set_family(loading, read_family(reader), species::family_of_species(sample.species), sample);
+  return sample;
+}
+
+}  // namespace
+
+Dataset load_prima(const DatasetOptions& options) {
+  Loading loading(options, {});
+  const nlohmann::json document = manifests::read_json_file(loading.file);
+  const nlohmann::json& data = manifests::array_of(document, "data", loading.file);
+  std::vector<SampleRecord> records;
+  records.reserve(data.size());
+  for (std::size_t i = 0; i < data.size(); ++i) records.push_back(read_record(data[i], i, loading));
+  return finished(loading, std::move(records));
+}
+
+}  // namespace q3d::loaders::formats

@@ -1,0 +1,43 @@
+// SuperAnimal-Quadruped80K: COCO with 39 keypoints, pictures of eight sub-datasets.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+
+#include "loaders/formats/coco.h"
+#include "manifests/json_file.h"
+
+namespace q3d::loaders::formats {
+namespace {
+
+using manifests::SampleRecord;
+
+// These sub-datasets put "neck" at the shoulder end; SuperAnimal files it under neck_base, which is the head
+// end (and the 26's neck). Such a point would teach the wrong place, so its weight is 0; v stays as it was.
+constexpr std::array<std::string_view, 4> kNeckAtTheShoulders{"ap10k", "apt36k", "cheetah", "acinoset"};
+constexpr std::size_t kNeck = 18;  // of Animal3D's 26
+
+bool has_neck_at_the_shoulders(std::string_view source) {
+  return std::find(kNeckAtTheShoulders.begin(), kNeckAtTheShoulders.end(),
+                   species::normalised_source(source)) != kNeckAtTheShoulders.end();
+}
+
+void add_species(Loading& loading, RecordReader&, SampleRecord& sample) {
+  if (has_neck_at_the_shoulders(sample.source) && sample.keypoints[kNeck].weight > 0.0F) {
+    sample.keypoints[kNeck].weight = 0.0F;
+    loading.notes.count(fmt::format("source {} has its neck at the shoulders (weight 0)", sample.source),
+                        sample.id);
+  }
+  sample.species = species::species_of_picture(sample.image_ref, sample.source);
+  set_family(loading, std::nullopt, species::family_of_species(sample.species), sample);
+}
+
+}  // namespace
+
+Dataset load_superanimal(const DatasetOptions& options) {
+  Loading loading(options, "images");
+  const nlohmann::json document = manifests::read_json_file(loading.file);
+  return load_coco(document, keypoints::topology("superanimal_quadruped39"), loading, {.add = add_species});
+}
+
+}  // namespace q3d::loaders::formats

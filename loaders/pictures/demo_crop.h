@@ -1,0 +1,24 @@
+// The official demo's crop, for pictures with a detector's box and no annotation.
+#pragma once
+
+#include <array>
+#include <opencv2/core.hpp>
+#include <vector>
+
+namespace q3d::loaders::pictures {
+
+struct DemoCrop {
+  std::vector<float> planes;  // (3, 256, 256) RGB, normalised with ImageNet's mean and std
+  float center_x_px = 0.0F;
+  float center_y_px = 0.0F;
+  float side_px = 0.0F;
+};
+
+// Official code: ViTDetDataset. The box is (x1, y1, x2, y2) in pixels; its centre is not floored, its side is
+// the longer one after the box was widened to `aspect` (width, height; {0, 0} leaves it), and a picture that
+// shrinks more than 2.2 times is blurred first (Gaussian, in double) and then warped without rounding to 8
+// bits. Throws std::invalid_argument on other types than 8-bit RGB or a box without area.
+DemoCrop demo_crop(const cv::Mat& rgb, const std::array<float, 4>& box_xyxy,
+                   const std::array<int, 2>& aspect = {0, 0});
+
+}  // namespace q3d::loaders::pictures

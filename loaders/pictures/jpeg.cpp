@@ -1,0 +1,146 @@
+#include "loaders/pictures/jpeg.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <csetjmp>
+#include <cstdio>  // jpeglib.h needs FILE and size_t
+
+#include <jpeglib.h>
+
+#include <jerror.h>
+
+namespace q3d::loaders::pictures {
+namespace {
+
+using manifests::Reason;
+
+// A progressive file may repeat scans over the whole picture; no encoder writes more than a few dozen.
+constexpr int kMaxScans = 500;
+
+// libjpeg reports errors by a callback that must not return, so it jumps back to run(). Nothing on the way
+// may own memory: this struct is plain, and the pixel buffer belongs to the caller.
+struct Decoder {
+  jpeg_decompress_struct info{};
+  jpeg_error_mgr errors{};
+  jpeg_progress_mgr progress{};
+  std::jmp_buf give_up{};
+  std::array<char, JMSG_LENGTH_MAX> message{};
+  bool ended_early = false;
+  bool too_many_scans = false;
+  std::span<const std::byte> bytes;
+  std::uint8_t* pixels = nullptr;
+  std::size_t row_bytes = 0;
+};
+
+Decoder& owner(j_common_ptr info) {
+  return *static_cast<Decoder*>(info->client_data);
+}
+
+void on_error(j_common_ptr info) {
+  Decoder& decoder = owner(info);
+  info->err->format_message(info, decoder.message.data());
+  std::longjmp(decoder.give_up, 1);
+}
+
+void on_message(j_common_ptr info, int level) {
+  if (level >= 0) return;  // tracing
+  const int code = info->err->msg_code;
+  if (code == JWRN_JPEG_EOF || code == JWRN_HIT_MARKER) owner(info).ended_early = true;
+}
+
+void on_progress(j_common_ptr info) {
+  Decoder& decoder = owner(info);
+  if (decoder.info.input_scan_number <= kMaxScans) return;
+  decoder.too_many_scans = true;
+  std::longjmp(decoder.give_up, 1);
+}
+
+void read_header(Decoder& decoder) {
+  jpeg_create_decompress(&decoder.info);  // keeps err and client_data
+  decoder.info.progress = &decoder.progress;
+  jpeg_mem_src(&decoder.info, reinterpret_cast<const unsigned char*>(decoder.bytes.data()),
+               static_cast<unsigned long>(decoder.bytes.size()));
+  jpeg_read_header(&decoder.info, TRUE);
+}
+
+void read_rows(Decoder& decoder) {
+  jpeg_start_decompress(&decoder.info);
+  while (decoder.info.output_scanline < decoder.info.output_height) {
+    JSAMPROW row = decoder.pixels + decoder.info.output_scanline * decoder.row_bytes;
+    jpeg_read_scanlines(&decoder.info, &row, 1);
+  }
+  jpeg_finish_decompress(&decoder.info);
+}
+
+// False when libjpeg gave up inside `step`.
+bool run(Decoder& decoder, void (*step)(Decoder&)) {
+  if (setjmp(decoder.give_up) != 0) return false;
+  step(decoder);
+  return true;
+}
+
+DecodedImage failed(const Decoder& decoder) {
+  if (decoder.ended_early) return {{}, Reason::image_truncated, "the JPEG data end before the picture does"};
+  if (decoder.too_many_scans) {
+    return {{}, Reason::image_too_large, fmt::format("got a JPEG with more than {} scans", kMaxScans)};
+  }
+  return {
+      {}, Reason::image_not_an_image, fmt::format("JPEG that cannot be decoded: {}", decoder.message.data())};
+}
+
+// As PIL's CMYK;I and convert('RGB'): the stored bytes are inverted ink, black scales the rest.
+cv::Mat rgb_from_inverted_cmyk(const cv::Mat& cmyk) {
+  cv::Mat rgb(cmyk.size(), CV_8UC3);
+  for (int y = 0; y < cmyk.rows; ++y) {
+    const auto* from = cmyk.ptr<cv::Vec4b>(y);
+    auto* to = rgb.ptr<cv::Vec3b>(y);
+    for (int x = 0; x < cmyk.cols; ++x) {
+      const int light = from[x][3];
+      for (int c = 0; c < 3; ++c) {
+        const int product = (255 - from[x][c]) * light + 128;
+        to[x][c] = static_cast<std::uint8_t>(light - ((product + (product >> 8)) >> 8));
+      }
+    }
+  }
+  return rgb;
+}
+
+DecodedImage decode_with(Decoder& decoder) {
+  if (!run(decoder, read_header)) return failed(decoder);
+  const auto width = static_cast<std::int64_t>(decoder.info.image_width);
+  const auto height = static_cast<std::int64_t>(decoder.info.image_height);
+  if (width * height > kMaxPixels) {
+    return {{},
+            Reason::image_too_large,
+            fmt::format("got a JPEG of {} x {} px, expected at most {} px", width, height, kMaxPixels)};
+  }
+  const bool is_cmyk = decoder.info.num_components == 4;
+  decoder.info.out_color_space = is_cmyk ? JCS_CMYK : JCS_RGB;
+  cv::Mat pixels(static_cast<int>(height), static_cast<int>(width), is_cmyk ? CV_8UC4 : CV_8UC3);
+  decoder.pixels = pixels.data;
+  decoder.row_bytes = pixels.step;
+  if (!run(decoder, read_rows) || decoder.ended_early) return failed(decoder);
+  return {is_cmyk ? rgb_from_inverted_cmyk(pixels) : pixels, Reason::none, {}};
+}
+
+}  // namespace
+
+bool is_jpeg(std::span<const std::byte> bytes) {
+  return bytes.size() >= 2 && bytes[0] == std::byte{0xff} && bytes[1] == std::byte{0xd8};
+}
+
+DecodedImage decode_jpeg(std::span<const std::byte> bytes) {
+  Decoder decoder;
+  decoder.bytes = bytes;
+  decoder.info.client_data = &decoder;
+  decoder.info.err = jpeg_std_error(&decoder.errors);
+  decoder.errors.error_exit = on_error;
+  decoder.errors.emit_message = on_message;
+  decoder.progress.progress_monitor = on_progress;
+  DecodedImage decoded = decode_with(decoder);
+  jpeg_destroy_decompress(&decoder.info);
+  return decoded;
+}
+
+}  // namespace q3d::loaders::pictures

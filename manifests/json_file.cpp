@@ -1,0 +1,144 @@
+#include "manifests/json_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <stdexcept>
+#include <string_view>
+
+namespace q3d::manifests {
+namespace {
+
+constexpr std::uintmax_t kMaxAnnotationBytes = std::uintmax_t{4} << 30U;
+
+std::string read_text(const std::filesystem::path& file) {
+  std::error_code error;
+  const auto size = std::filesystem::file_size(file, error);
+  if (error || !std::filesystem::is_regular_file(file)) {
+    throw std::runtime_error(fmt::format("{}: got {}, expected an annotation file", file.string(),
+                                         error ? error.message() : "no regular file"));
+  }
+  if (size > kMaxAnnotationBytes) {
+    throw std::runtime_error(fmt::format("{}: got {} bytes, expected an annotation file of at most {}",
+                                         file.string(), size, kMaxAnnotationBytes));
+  }
+  std::string text(size, '\0');
+  std::ifstream stream(file, std::ios::binary);
+  stream.read(text.data(), static_cast<std::streamsize>(size));
+  if (!stream) throw std::runtime_error(fmt::format("{}: cannot be read", file.string()));
+  return text;
+}
+
+bool is_token_char(char c) {
+  return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '-' || c == '+' ||
+         c == '.';
+}
+
+// Whether a bare word is a number that JSON cannot hold. Most words are short plain numbers, so the tests
+// that cost little come first.
+bool is_no_json_number(std::string_view word) {
+  if (word == "NaN" || word == "Infinity" || word == "-Infinity") return true;
+  const bool is_number = word[0] == '-' || (word[0] >= '0' && word[0] <= '9');
+  const bool may_overflow = word.size() > 300 || word.find_first_of("eE") != std::string_view::npos;
+  return is_number && may_overflow && std::isinf(std::strtod(std::string(word).c_str(), nullptr));
+}
+
+// Turns numbers that JSON cannot hold into texts of tildes of the same length, so that the rest of the file
+// stays readable and byte positions stay true. describe() and the readers know these texts.
+void mask_numbers_beyond_json(std::string& text) {
+  bool in_string = false;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (in_string && text[i] == '\\') {
+      ++i;
+    } else if (text[i] == '"') {
+      in_string = !in_string;
+    } else if (!in_string && is_token_char(text[i])) {
+      std::size_t end = i;
+      while (end < text.size() && is_token_char(text[end])) ++end;
+      const std::string_view word = std::string_view(text).substr(i, end - i);
+      if (word.size() > 2 && is_no_json_number(word)) {
+        std::fill(text.begin() + static_cast<std::ptrdiff_t>(i),
+                  text.begin() + static_cast<std::ptrdiff_t>(end), '~');
+        text[i] = text[end - 1] = '"';
+      }
+      i = end - 1;
+    }
+  }
+}
+
+}  // namespace
+
+nlohmann::json read_json_file(const std::filesystem::path& file) {
+  std::string text = read_text(file);
+  if (text.starts_with("version https://git-lfs")) {
+    throw std::runtime_error(
+        fmt::format("{}: got a Git-LFS pointer, expected JSON: run `git lfs pull`", file.string()));
+  }
+  mask_numbers_beyond_json(text);
+  try {
+    return nlohmann::json::parse(text);
+  } catch (const nlohmann::json::parse_error& error) {
+    const std::size_t at = std::min(error.byte, text.size());
+    const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n');
+    // The library's message repeats the position, which ends with ": ".
+    std::string reason = error.what();
+    const auto colon = reason.find(": ");
+    if (colon != std::string::npos) reason.erase(0, colon + 2);
+    // It also repeats what was read last, which may be the rest of the file.
+    constexpr std::size_t kLongest = 300;
+    if (reason.size() > kLongest) reason.replace(kLongest / 2, reason.size() - kLongest, " ... ");
+    throw std::runtime_error(fmt::format("{}: line {}, byte {} of {}: {}{}", file.string(), line, error.byte,
+                                         text.size(), reason,
+                                         at >= text.size() ? " (the file seems to be cut short)" : ""));
+  }
+}
+
+const nlohmann::json& array_of(const nlohmann::json& document, const std::string& key,
+                               const std::filesystem::path& file) {
+  if (!document.is_object()) {
+    throw std::runtime_error(fmt::format("{}: top level: got {}, expected an object with an array \"{}\"",
+                                         file.string(), describe(document), key));
+  }
+  const auto found = document.find(key);
+  if (found == document.end()) {
+    std::string keys;
+    for (const auto& item : document.items()) {
+      keys += (keys.empty() ? "\"" : ", \"") + item.key() + "\"";
+      if (keys.size() > 200) break;
+    }
+    throw std::runtime_error(fmt::format("{}: top level: got the keys {}, expected an array \"{}\"",
+                                         file.string(), keys.empty() ? "(none)" : keys, key));
+  }
+  if (!found->is_array()) {
+    throw std::runtime_error(
+        fmt::format("{}: {}: got {}, expected an array", file.string(), key, describe(*found)));
+  }
+  return *found;
+}
+
+bool is_beyond_json(const nlohmann::json& value) {
+  if (!value.is_string()) return false;
+  const auto& text = value.get_ref<const std::string&>();
+  return !text.empty() && text.find_first_not_of('~') == std::string::npos;
+}
+
+std::string describe(const nlohmann::json& value) {
+  constexpr std::size_t kShown = 60;
+  if (is_beyond_json(value)) return "a number that is not finite";
+  if (value.is_string()) {
+    const auto& text = value.get_ref<const std::string&>();
+    std::size_t shown = std::min(text.size(), kShown);
+    // Never cut a UTF-8 character: what is said here is stored as JSON again.
+    while (shown > 0 && shown < text.size() && (static_cast<unsigned char>(text[shown]) & 0xC0U) == 0x80U)
+      --shown;
+    return fmt::format("the text \"{}{}\"", text.substr(0, shown), shown < text.size() ? "..." : "");
+  }
+  if (value.is_array()) return fmt::format("{} value{}", value.size(), value.size() == 1 ? "" : "s");
+  if (value.is_object()) return fmt::format("an object of {} keys", value.size());
+  return value.dump();
+}
+
+}  // namespace q3d::manifests

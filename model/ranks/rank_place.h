@@ -1,0 +1,28 @@
+// Which rank this process is, as its launcher says in the environment.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+
+namespace q3d::model::ranks {
+
+struct RankPlace {
+  int rank = 0;
+  int size = 1;
+  int local_rank = 0;          // among the ranks of this machine: chooses its GPU
+  int local_size = 1;          // ranks of this machine, which share its cores
+  std::string master_address;  // where the ranks meet; empty in a world of one
+  std::uint16_t master_port = 0;
+  bool launcher_has_store = false;           // torchrun's agent listens there; else rank 0 does
+  std::chrono::seconds join_timeout{300};    // for all ranks to appear
+  std::chrono::seconds answer_timeout{600};  // for a rank that computes
+};
+
+// torchrun: RANK, WORLD_SIZE, LOCAL_RANK, LOCAL_WORLD_SIZE, MASTER_ADDR, MASTER_PORT. Slurm's srun:
+// SLURM_PROCID, SLURM_NTASKS, SLURM_LOCALID, SLURM_NTASKS_PER_NODE, with MASTER_ADDR and MASTER_PORT set by
+// the user. Neither, or one rank: a world of one. Throws std::invalid_argument naming the variable, got and
+// expected.
+RankPlace rank_place_from_environment();
+
+}  // namespace q3d::model::ranks

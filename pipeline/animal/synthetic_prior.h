@@ -1,0 +1,35 @@
+// What poses and shapes the synthetic quadruped takes: priors in the official layout, and samples from them.
+#pragma once
+
+#include <torch/torch.h>
+
+#include <random>
+
+namespace q3d::pipeline::animal {
+
+// Official code: PosePriorLoss. The prior loss squares (pose - mean) @ precs, of which it leaves out the
+// first 3.
+struct PosePrior {
+  torch::Tensor mean;        // (105) float32 rad: axis-angle of 35 joints, the global orientation first
+  torch::Tensor covariance;  // (105, 105)
+  torch::Tensor precs;       // (105, 105): lower Cholesky factor of inverse(covariance + 1e-5 I)
+};
+
+// Official code: ShapePriorLoss. The prior loss squares (betas - means[family]) @ precs[family].
+struct ShapePrior {
+  torch::Tensor means;        // (5, 41) float32
+  torch::Tensor covariances;  // (5, 41, 41)
+  torch::Tensor precs;        // (5, 41, 41): lower Cholesky factors of inverse(covariance + 1e-5 I)
+};
+
+PosePrior synthetic_pose_prior();
+ShapePrior synthetic_shape_prior();
+
+// (35, 3) float32 axis-angle, rad: standing, walking, running, grazing, crouching, within the joints' ranges.
+// Row 0, the global orientation, is zero.
+torch::Tensor sample_pose(std::mt19937_64& random);
+
+// (41) float32. Families 0 to 4; throws std::invalid_argument on another one.
+torch::Tensor sample_betas(std::int64_t family, std::mt19937_64& random);
+
+}  // namespace q3d::pipeline::animal

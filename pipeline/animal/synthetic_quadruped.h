@@ -1,0 +1,19 @@
+// A synthetic quadruped with SMAL's dimensions, because SMAL itself cannot be redistributed.
+#pragma once
+
+#include <array>
+
+#include "smal/tensors/asset.h"
+
+namespace q3d::pipeline::animal {
+
+// A closed animal (legs, tail, head, ears) with 3889 vertices, 7774 faces, 35 joints, 41 shape and 306 pose
+// blend shapes; left-right symmetric; the same numbers on every call.
+smal::tensors::SmalAsset make_synthetic_quadruped();
+
+// Betas (41) at the centre of each of the five families (Felidae, Canidae, Equidae, Bovidae, Hippopotamidae),
+// and the standard deviation of each beta inside a family. (5, 41) and (41), float32.
+torch::Tensor synthetic_family_means();
+torch::Tensor synthetic_betas_std();
+
+}  // namespace q3d::pipeline::animal

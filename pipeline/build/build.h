@@ -1,0 +1,24 @@
+// The main job: annotated photographs in, a versioned dataset out.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "pipeline/config/build_config.h"
+#include "pipeline/dataset/dataset_manifest.h"
+#include "pipeline/run/run_options.h"
+
+namespace q3d::pipeline::build {
+
+struct BuildSummary {
+  dataset::DatasetManifest dataset;
+  std::filesystem::path folder;  // <out>/<name>-<key>
+  double seconds = 0.0;
+  bool was_up_to_date = false;
+};
+
+// Makes <out>/<name>-<key>/ and points <out>/latest at it; goes on where an earlier run ended. Throws
+// ConfigError, std::runtime_error, Interrupted.
+BuildSummary build(const config::BuildConfig& config, const run::RunOptions& options);
+
+}  // namespace q3d::pipeline::build

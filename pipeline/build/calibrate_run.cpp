@@ -1,0 +1,233 @@
+#include "pipeline/build/calibrate_run.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <stdexcept>
+
+#include "filters/metrics.h"
+#include "loaders/pictures/crop.h"
+#include "manifests/atomic_file.h"
+#include "pipeline/build/workspace.h"
+#include "pipeline/run/errors.h"
+#include "pipeline/run/interrupt.h"
+#include "pipeline/run/progress.h"
+#include "pipeline/stages/stage_store.h"
+#include "pipeline/unit/unit_flow.h"
+#include "pipeline/unit/unit_steps.h"
+#include "pipeline/unit/unit_tables.h"
+
+namespace q3d::pipeline::build {
+namespace {
+
+constexpr std::size_t kCurvePoints = 200;
+constexpr double kNoLimit = std::numeric_limits<double>::infinity();
+
+// A candidate with a prediction.
+struct Scored {
+  const candidates::Candidate* candidate = nullptr;
+  filters::ScoredSample score;
+};
+
+// Of every candidate with pseudo labels and a prediction that is not excluded, in ingest order. What an
+// earlier run predicted is not predicted again.
+std::vector<Scored> predict_pool(const config::BuildConfig& config, Workspace& workspace) {
+  const candidates::Ingest& ingest = workspace.ingest();
+  stages::StageStore predictions(workspace.out(), "predict",
+                                 stages::predict_key(config, workspace.assets(), workspace.device_key()));
+  std::vector<Scored> scored;
+  run::Progress progress("predicted", static_cast<std::int64_t>(ingest.candidates.size()), workspace.quiet());
+  unit::UnitFlow flow;
+  flow.units = static_cast<std::int64_t>(ingest.units.size());
+  flow.read = [&](std::int64_t index) {
+    auto work = std::make_shared<unit::UnitWork>();
+    work->unit = &ingest.units[static_cast<std::size_t>(index)];
+    work->candidates = std::span(ingest.candidates).subspan(work->unit->first, work->unit->count);
+    if (const auto table = predictions.load(*work->unit))
+      work->predicted = unit::predicted_from_table(*table);
+    work->predicted_before = work->predicted.has_value();
+    return work;
+  };
+  flow.decode = [&](unit::UnitWork& work) { unit::decode_unit(work, config.shards, nullptr); };
+  flow.compute = [&](unit::UnitWork& work) {
+    if (!work.predicted) unit::predict_unit(work, [&]() -> device::Network& { return workspace.network(); });
+  };
+  flow.write = [&](unit::UnitWork& work) {
+    if (!work.predicted_before)
+      predictions.save(*work.unit, unit::to_table(work.candidates, *work.predicted));
+    for (std::size_t i = 0; i < work.candidates.size(); ++i) {
+      if (work.candidates[i].exclusion.reason != manifests::Reason::none) continue;
+      const unit::PredictedSample& predicted = (*work.predicted)[i];
+      const double error = unit::initial_error(work.candidates[i], predicted);
+      if (std::isnan(error)) continue;
+      const auto auc =
+          filters::auc(predicted.body.keypoints_2d, unit::crop_keypoints(work.candidates[i].record),
+                       loaders::pictures::kPatchSidePx);
+      scored.push_back({&work.candidates[i], {error, 100.0 * auc.value()}});
+    }
+    progress.advance(static_cast<std::int64_t>(work.unit->count), work.predicted_before);
+  };
+  unit::run_units(flow, workspace.device());
+  return scored;
+}
+
+// Adapts some candidates for as long as the gain is measured and says which of them the fidelity rule would
+// keep. `limits` has no tau_high, so that all of them lie in the middle band.
+std::vector<bool> adapt_some(const std::vector<const Scored*>& candidates, const filters::Thresholds& limits,
+                             const config::BuildConfig& config, Workspace& workspace) {
+  std::vector<std::vector<std::uint8_t>> patches(candidates.size());
+  tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t i) {
+    patches[i] = unit::decode_sample(candidates[i]->candidate->record, {.patch = true}, config.shards).patch;
+  });
+  std::vector<device::AdaptRequest> requests;
+  std::vector<std::size_t> positions;
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    if (patches[i].empty()) continue;
+    requests.push_back(unit::adapt_request(candidates[i]->candidate->record, patches[i],
+                                           candidates[i]->score.initial_error, limits, config.guards));
+    positions.push_back(i);
+  }
+  std::vector<device::AdaptOutcome> outcomes;
+  workspace.device().run([&] { outcomes = workspace.network().adapt(requests); });
+  std::vector<bool> passes(candidates.size(), false);
+  for (std::size_t j = 0; j < outcomes.size(); ++j) {
+    const Scored& scored = *candidates[positions[j]];
+    unit::RefinedSample refined;
+    refined.curve = std::move(outcomes[j].curve);
+    refined.held_out_curve = std::move(outcomes[j].held_out_curve);
+    passes[positions[j]] = unit::judge_refined(scored.candidate->record, scored.score.initial_error, refined,
+                                               limits, config.guards)
+                               .verdict == manifests::Verdict::refined;
+  }
+  return passes;
+}
+
+// Adapts candidates from tau_low upwards, a chunk at a time, until enough have passed. Those further out keep
+// `passes_adaptation`: they lie beyond tau_high whatever they would do.
+std::int64_t adapt_until_enough(std::vector<filters::CalibrationSample>& pool,
+                                const std::vector<Scored>& candidates, const filters::Thresholds& limits,
+                                const config::BuildConfig& config, Workspace& workspace) {
+  const auto chunk = static_cast<std::size_t>(config.tta.batch) * 4;
+  const auto needed =
+      static_cast<std::int64_t>(std::ceil(config.calibrate.refined * static_cast<double>(pool.size()))) + 1;
+  std::vector<std::size_t> order;
+  for (std::size_t i = 0; i < pool.size(); ++i) {
+    if (pool[i].initial_error >= limits.tau_low) order.push_back(i);
+  }
+  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return std::pair(pool[a].initial_error, a) < std::pair(pool[b].initial_error, b);
+  });
+  run::Progress progress("adapted", static_cast<std::int64_t>(order.size()), workspace.quiet());
+  std::int64_t passed = 0;
+  std::size_t done = 0;
+  while (done < order.size() && passed < needed) {
+    run::throw_if_interrupted();
+    const std::size_t count = std::min(chunk, order.size() - done);
+    std::vector<const Scored*> some;
+    for (std::size_t i = 0; i < count; ++i) some.push_back(&candidates[order[done + i]]);
+    const std::vector<bool> passes = adapt_some(some, limits, config, workspace);
+    for (std::size_t i = 0; i < count; ++i) {
+      pool[order[done + i]].passes_adaptation = passes[i];
+      passed += passes[i] ? 1 : 0;
+    }
+    done += count;
+    progress.advance(static_cast<std::int64_t>(count));
+  }
+  return static_cast<std::int64_t>(done);
+}
+
+double delta_of(const std::string& dataset, const config::FilterConfig& filter) {
+  const auto own = filter.datasets.find(dataset);
+  return own == filter.datasets.end() ? filter.delta : own->second.delta.value_or(filter.delta);
+}
+
+CalibratedPool calibrate_pool(const std::string& dataset, const std::vector<Scored>& candidates,
+                              const config::BuildConfig& config, Workspace& workspace) {
+  if (candidates.empty()) {
+    throw std::runtime_error(fmt::format(
+        "no candidate{} could be predicted, so there is nothing to calibrate on; `build` with any thresholds "
+        "lists why in verdicts.csv",
+        dataset.empty() ? "" : " of the dataset " + dataset));
+  }
+  std::vector<filters::CalibrationSample> pool;
+  std::vector<filters::ScoredSample> scores;
+  for (const Scored& scored : candidates) {
+    pool.push_back({scored.score.initial_error, true});
+    scores.push_back(scored.score);
+  }
+  filters::Thresholds base;
+  base.delta = delta_of(dataset, config.filter);
+  // tau_low is a quantile of the errors alone; what passes adaptation decides tau_high.
+  filters::Thresholds limits = filters::calibrate(pool, config.calibrate, base).thresholds;
+  limits.tau_high = kNoLimit;
+  limits.iterations_min = limits.iterations_max = limits.gain_window;
+  CalibratedPool result;
+  result.dataset = dataset;
+  result.adapted = adapt_until_enough(pool, candidates, limits, config, workspace);
+  result.calibration = filters::calibrate(pool, config.calibrate, base);
+  result.judged = static_cast<std::int64_t>(pool.size());
+  result.curve = filters::yield_curve(scores, kCurvePoints);
+  result.at_tau_low = filters::yield_at(scores, result.calibration.thresholds.tau_low);
+  result.at_tau_high = filters::yield_at(scores, result.calibration.thresholds.tau_high);
+  return result;
+}
+
+// All candidates under the empty name, or those of each dataset with pseudo labels under its own.
+std::map<std::string, std::vector<Scored>> split_pool(std::vector<Scored> scored,
+                                                      const config::BuildConfig& config) {
+  std::map<std::string, std::vector<Scored>> pools;
+  if (!config.calibrate.per_dataset) {
+    pools[""] = std::move(scored);
+    return pools;
+  }
+  for (const config::DatasetConfig& dataset : config.datasets) {
+    if (dataset.role == config::Role::pseudo) pools[dataset.name];
+  }
+  for (const Scored& each : scored) pools[each.candidate->record.dataset].push_back(each);
+  return pools;
+}
+
+}  // namespace
+
+CalibrationSummary calibrate(const config::BuildConfig& config, const run::RunOptions& options) {
+  if (!config::needs_network(config)) {
+    throw run::ConfigError(
+        "no dataset of the config has the role \"pseudo\", so no label is predicted and there is nothing to "
+        "calibrate: `build` needs no thresholds here");
+  }
+  const auto start = std::chrono::steady_clock::now();
+  Workspace workspace(config, options);
+  CalibrationSummary summary;
+  summary.candidates = static_cast<std::int64_t>(workspace.ingest().candidates.size());
+  for (const auto& [dataset, candidates] : split_pool(predict_pool(config, workspace), config)) {
+    summary.pools.push_back(calibrate_pool(dataset, candidates, config, workspace));
+  }
+  summary.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return summary;
+}
+
+std::string thresholds_layer(const CalibrationSummary& summary) {
+  nlohmann::ordered_json filter = nlohmann::ordered_json::object();
+  for (const CalibratedPool& pool : summary.pools) {
+    const filters::Thresholds& thresholds = pool.calibration.thresholds;
+    nlohmann::ordered_json& place = pool.dataset.empty() ? filter : filter["datasets"][pool.dataset];
+    place["tau_low"] = thresholds.tau_low;
+    place["tau_high"] = thresholds.tau_high;
+    place["delta"] = thresholds.delta;
+  }
+  return nlohmann::ordered_json{{"filter", filter}}.dump(2) + "\n";
+}
+
+void write_thresholds(const std::filesystem::path& path, const CalibrationSummary& summary) {
+  if (path.has_parent_path()) std::filesystem::create_directories(path.parent_path());
+  manifests::write_file_atomically(path, thresholds_layer(summary));
+}
+
+}  // namespace q3d::pipeline::build

@@ -1,0 +1,42 @@
+// `calibrate`: thresholds for a pool and a network, from the shares that should come out.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "filters/calibrate.h"
+#include "filters/yield_curve.h"
+#include "pipeline/build/build.h"
+#include "pipeline/config/build_config.h"
+
+namespace q3d::pipeline::build {
+
+// The candidates that share thresholds: all of them, or those of one dataset.
+struct CalibratedPool {
+  std::string dataset;  // empty: all datasets
+  filters::Calibration calibration;
+  std::int64_t judged = 0;   // candidates with a prediction
+  std::int64_t adapted = 0;  // of the middle band, to see whether they reach delta
+  std::vector<filters::YieldPoint> curve;
+  filters::YieldPoint at_tau_low;
+  filters::YieldPoint at_tau_high;
+};
+
+struct CalibrationSummary {
+  std::vector<CalibratedPool> pools;
+  std::int64_t candidates = 0;
+  double seconds = 0.0;
+};
+
+// Predicts every candidate (a later build finds the predictions in the same output folder), then adapts
+// candidates in order of their error, under the guards that change adaptation, until enough of them reach
+// delta. AUC is against the annotated keypoints, by the whole crop. With config.calibrate.per_dataset every
+// dataset is a pool of its own. Throws ConfigError, std::runtime_error, Interrupted.
+CalibrationSummary calibrate(const config::BuildConfig& config, const run::RunOptions& options);
+
+// A config layer with the thresholds, for `build --config`.
+void write_thresholds(const std::filesystem::path& path, const CalibrationSummary& summary);
+std::string thresholds_layer(const CalibrationSummary& summary);  // its text
+
+}  // namespace q3d::pipeline::build

@@ -1,0 +1,106 @@
+#include "pipeline/build/publish.h"
+
+#include <fmt/format.h>
+
+#include <stdexcept>
+
+#include "manifests/atomic_file.h"
+
+namespace q3d::pipeline::build {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr fs::perms kReadOnly = fs::perms::owner_read | fs::perms::group_read | fs::perms::others_read;
+
+// A hard link where the file system has them, so that versions that share a shard share its bytes; else a
+// copy.
+void link_or_copy(const fs::path& from, const fs::path& to) {
+  std::error_code error;
+  fs::remove(to, error);
+  fs::create_hard_link(from, to, error);
+  if (error) {
+    const fs::path temporary = to.string() + ".tmp";
+    fs::copy_file(from, temporary, fs::copy_options::overwrite_existing);
+    manifests::commit_file(temporary, to);
+  }
+  fs::permissions(to, kReadOnly, error);  // immutable as far as a plain user goes
+}
+
+std::vector<dataset::ShardEntry> link_shards(const fs::path& folder, const candidates::Ingest& ingest,
+                                             const stages::StageStore& shards) {
+  fs::create_directories(folder / "shards");
+  manifests::remove_temporaries(folder);  // what a build that was killed while it published left
+  manifests::remove_temporaries(folder / "shards");
+  std::vector<dataset::ShardEntry> entries;
+  for (const candidates::Unit& unit : ingest.units) {
+    const auto entry = shards.entry(unit);
+    if (!entry) throw std::runtime_error(fmt::format("unit {} has no finished shard", unit.index));
+    const std::string name = fmt::format("shards/{:06}.h5", unit.index);
+    link_or_copy(shards.file(unit), folder / name);
+    entries.push_back({name, entry->sha256, entry->bytes, entry->rows, unit.index});
+  }
+  return entries;
+}
+
+void check_sums(const candidates::Ingest& ingest, const std::vector<manifests::Judgement>& judgements,
+                const std::vector<dataset::ShardEntry>& shards) {
+  dataset::Counts counts;
+  for (const auto& judgement : judgements) counts.add(judgement.verdict);
+  std::int64_t rows = 0;
+  for (const dataset::ShardEntry& shard : shards) rows += shard.rows;
+  const auto candidates = static_cast<std::int64_t>(ingest.candidates.size());
+  if (counts.candidates != candidates ||
+      counts.retained + counts.refined + counts.discarded + counts.failed != candidates ||
+      counts.retained + counts.refined != rows) {
+    throw std::runtime_error(
+        fmt::format("the books do not balance: {} candidates, {} retained + {} refined + {} discarded + {} "
+                    "failed, {} rows in "
+                    "shards",
+                    candidates, counts.retained, counts.refined, counts.discarded, counts.failed, rows));
+  }
+}
+
+}  // namespace
+
+fs::path version_folder(const fs::path& out, const config::BuildConfig& config,
+                        const stages::StageKeys& keys) {
+  return out / (config.name + "-" + keys.dataset.substr(0, stages::kShortKey));
+}
+
+bool is_published(const fs::path& folder, const stages::StageKeys& keys) {
+  if (!fs::exists(folder / "dataset.json")) return false;
+  const dataset::DatasetManifest manifest = dataset::read_dataset_manifest(folder);
+  if (manifest.key != keys.dataset) {
+    throw std::runtime_error(
+        fmt::format("{}: holds a dataset with key {}, expected {}; a finished dataset is never "
+                    "written over. Build into another folder",
+                    folder.string(), manifest.key, keys.dataset));
+  }
+  for (const dataset::ShardEntry& shard : manifest.shards) {
+    std::error_code error;
+    if (static_cast<std::int64_t>(fs::file_size(folder / shard.file, error)) != shard.bytes || error)
+      return false;
+  }
+  return true;
+}
+
+void publish(const fs::path& folder, const dataset::DatasetInputs& inputs,
+             const std::vector<manifests::Judgement>& judgements, const stages::StageStore& shards) {
+  const candidates::Ingest& ingest = *inputs.ingest;
+  const std::vector<dataset::ShardEntry> entries = link_shards(folder, ingest, shards);
+  check_sums(ingest, judgements, entries);
+  const std::string csv = dataset::verdicts_csv(ingest, judgements);
+  manifests::write_file_atomically(folder / "verdicts.csv", csv);
+  const std::string document = dataset::dataset_json(inputs, judgements, entries, manifests::sha256(csv));
+  manifests::write_file_atomically(folder / "dataset.json", document);
+}
+
+void point_latest(const fs::path& out, const fs::path& folder) {
+  const fs::path temporary = out / "latest.tmp";
+  fs::remove(temporary);
+  fs::create_directory_symlink(folder.filename(), temporary);
+  fs::rename(temporary, out / "latest");
+}
+
+}  // namespace q3d::pipeline::build

@@ -1,0 +1,51 @@
+// What every run over an output folder begins with: the lock, the candidates, the assets and the network.
+#pragma once
+
+#include <tbb/global_control.h>
+
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "manifests/digest.h"
+#include "manifests/lock.h"
+#include "pipeline/candidates/ingest.h"
+#include "pipeline/device/device_worker.h"
+#include "pipeline/device/network.h"
+#include "pipeline/run/run_options.h"
+#include "pipeline/stages/stages.h"
+
+namespace q3d::pipeline::build {
+
+class Workspace {
+ public:
+  // Takes the folder's lock, digests the assets and ingests the datasets. Throws ConfigError,
+  // std::runtime_error, Interrupted.
+  Workspace(const config::BuildConfig& config, const run::RunOptions& options);
+
+  const std::filesystem::path& out() const { return options_.out; }
+  const candidates::Ingest& ingest() const { return ingest_; }
+  const stages::AssetDigests& assets() const { return assets_; }
+  // Empty, like the digests of assets(), when no dataset needs the network.
+  const std::string& device_key() const { return device_key_; }
+  bool quiet() const { return options_.quiet; }
+
+  // The thread on which the network lives.
+  device::DeviceWorker& device() { return device_; }
+  // Loaded at the first call; call it on device()'s thread only.
+  device::Network& network();
+
+ private:
+  const config::BuildConfig& config_;
+  run::RunOptions options_;
+  tbb::global_control threads_;
+  manifests::FolderLock lock_;
+  manifests::DigestCache digests_;
+  stages::AssetDigests assets_;
+  std::string device_key_;
+  candidates::Ingest ingest_;
+  std::unique_ptr<device::Network> network_;
+  device::DeviceWorker device_;
+};
+
+}  // namespace q3d::pipeline::build

@@ -1,0 +1,142 @@
+#include "pipeline/candidates/ingest.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <set>
+#include <stdexcept>
+
+#include "manifests/record_json.h"
+#include "pipeline/candidates/body_check.h"
+#include "pipeline/candidates/configured_dataset.h"
+#include "pipeline/run/interrupt.h"
+
+namespace q3d::pipeline::candidates {
+namespace {
+
+using manifests::Reason;
+
+// One file's own digest, or one over the digests of several.
+std::string digest_files(const std::vector<std::filesystem::path>& files, manifests::DigestCache& digests) {
+  if (files.size() == 1) return digests.digest(files.front());
+  std::string text;
+  for (const auto& file : files) text += digests.digest(file) + '\n';
+  return manifests::sha256(text);
+}
+
+void require_unique_ids(const std::vector<Candidate>& candidates) {
+  std::set<std::string_view> seen;
+  for (const Candidate& candidate : candidates) {
+    if (!seen.insert(candidate.record.id).second) {
+      throw std::runtime_error(fmt::format("the sample id {} occurs twice; ids must be unique within a build",
+                                           candidate.record.id));
+    }
+  }
+}
+
+// Paths of this machine do not belong into a dataset: equal builds in different folders have equal verdicts.
+std::string without_root(std::string text, const std::filesystem::path& root) {
+  const std::string prefix = (root / "").string();
+  for (std::size_t at = text.find(prefix); at != std::string::npos; at = text.find(prefix, at)) {
+    text.erase(at, prefix.size());
+  }
+  return text;
+}
+
+// A label must have what its role promises.
+void check_role(config::Role role, manifests::SampleRecord& record) {
+  if (role != config::Role::truth || record.failure != Reason::none) return;
+  if (record.truth && record.truth->has_pose) return;
+  record.failure = Reason::pose_missing;
+  record.failure_detail =
+      "pose: got nothing, or zeros throughout; expected 35 rotations, since the dataset's role is \"truth\"";
+}
+
+// A picture that cannot be read now is a failed sample, never a failed build; a mask is then none.
+void digest_pictures(std::vector<Candidate>& candidates, manifests::DigestCache& digests) {
+  tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t i) {
+    Candidate& candidate = candidates[i];
+    if (candidate.record.failure != Reason::none || run::interrupted()) return;
+    try {
+      candidate.image_sha256 = digests.digest(candidate.record.image_path);
+    } catch (const std::runtime_error&) {
+      candidate.record.failure = Reason::image_missing;
+      candidate.record.failure_detail = candidate.record.image_ref + " cannot be read";
+    }
+    if (candidate.record.mask_path.empty()) return;
+    try {
+      candidate.mask_sha256 = digests.digest(candidate.record.mask_path);
+    } catch (const std::runtime_error&) {  // decoding tells
+    }
+  });
+  run::throw_if_interrupted();
+}
+
+std::vector<Unit> cut_units(const std::vector<Candidate>& candidates, std::size_t unit_size) {
+  std::vector<Unit> units;
+  for (std::size_t first = 0; first < candidates.size(); first += unit_size) {
+    Unit unit;
+    unit.index = static_cast<std::int64_t>(units.size());
+    unit.first = first;
+    unit.count = std::min(unit_size, candidates.size() - first);
+    std::string text;
+    for (std::size_t i = first; i < first + unit.count; ++i) {
+      text += manifests::record_digest(candidates[i].record) + ' ' + candidates[i].image_sha256 + ' ' +
+              candidates[i].mask_sha256 + ' ';
+      text += std::string(to_string(candidates[i].role)) + '\n';
+      if (!candidates[i].finding.empty()) text += candidates[i].finding + '\n';
+    }
+    unit.input_digest = manifests::sha256(text);
+    unit.label_digest = unit.input_digest;
+    units.push_back(std::move(unit));
+  }
+  return units;
+}
+
+// Findings of all records; none without a body model.
+std::vector<std::string> check_truth(const config::DatasetConfig& options,
+                                     const device::BodyMeshesLoader& load_bodies,
+                                     loaders::formats::Dataset& dataset) {
+  if (options.body_model.empty() || !load_bodies) return std::vector<std::string>(dataset.records.size());
+  const std::unique_ptr<device::BodyMeshes> bodies = load_bodies(options.body_model);
+  BodyCheck check = check_bodies(*bodies, options.keypoints_3d_of_body, dataset.records);
+  dataset.notes.push_back(to_note(check));
+  return std::move(check.findings);
+}
+
+}  // namespace
+
+IngestedDataset read_dataset(const config::DatasetConfig& options, manifests::DigestCache& digests) {
+  run::throw_if_interrupted();
+  loaders::formats::Dataset dataset = load_configured(options);
+  for (auto& record : dataset.records) {
+    record.failure_detail = without_root(std::move(record.failure_detail), options.root);
+  }
+  std::string digest = digest_files(dataset.files, digests);
+  return {std::move(dataset), std::move(digest)};
+}
+
+Ingest ingest(const config::BuildConfig& config, manifests::DigestCache& digests,
+              const device::BodyMeshesLoader& load_bodies) {
+  Ingest result;
+  for (const auto& options : config.datasets) {
+    auto [dataset, digest] = read_dataset(options, digests);
+    const std::string name = options.name + "/" + options.split;
+    result.annotation_digests[name] = std::move(digest);
+    for (auto& record : dataset.records) check_role(options.role, record);
+    std::vector<std::string> findings = check_truth(options, load_bodies, dataset);
+    for (std::size_t i = 0; i < dataset.records.size(); ++i) {
+      result.candidates.push_back(
+          {std::move(dataset.records[i]), {}, {}, options.role, std::move(findings[i])});
+    }
+    for (const auto& note : dataset.notes) result.notes.push_back(name + ": " + note);
+  }
+  require_unique_ids(result.candidates);
+  digest_pictures(result.candidates, digests);
+  digests.save();
+  result.units = cut_units(result.candidates, static_cast<std::size_t>(config.shards.unit_size));
+  return result;
+}
+
+}  // namespace q3d::pipeline::candidates

@@ -1,0 +1,79 @@
+// Ingest: annotation files -> the ordered list of candidates, each with the digest of its picture.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "manifests/digest.h"
+#include "manifests/sample.h"
+#include "pipeline/candidates/veto.h"
+#include "pipeline/config/build_config.h"
+#include "pipeline/device/body_meshes.h"
+
+namespace q3d::pipeline::candidates {
+
+// Why a candidate is left out whatever its prediction.
+struct Exclusion {
+  manifests::Reason reason = manifests::Reason::none;
+  std::string detail;  // for people
+};
+
+struct Candidate {
+  manifests::SampleRecord record;
+  std::string image_sha256;                  // empty when the picture could not be read
+  std::string mask_sha256;                   // empty when there is none, or it could not be read
+  config::Role role = config::Role::pseudo;  // its dataset's
+  std::string finding;  // of the check of its body, for people; empty where there is nothing to tell
+  Exclusion exclusion{};
+};
+
+// A fixed run of candidates in ingest order: the grain of resume and of determinism. It becomes one shard.
+struct Unit {
+  std::int64_t index = 0;
+  std::size_t first = 0;  // into Ingest::candidates
+  std::size_t count = 0;
+  std::string input_digest;  // over the records, pictures, masks and roles of the unit
+  std::string
+      label_digest;  // the same, and over what is left out: predictions do not depend on it, shards do
+};
+
+// What came of comparing the pool with the test sets.
+struct LeakageSummary {
+  std::map<std::string, std::string> test_sets;  // "name/split" -> SHA-256 of its annotation files
+  std::size_t test_pictures = 0;
+  std::size_t excluded = 0;   // candidates
+  std::size_t groups = 0;     // of pictures of the pool that look alike
+  std::size_t in_groups = 0;  // pictures
+};
+
+struct Ingest {
+  std::vector<Candidate> candidates;  // dataset order of the config, then file order
+  std::vector<Unit> units;
+  std::map<std::string, std::string> annotation_digests;  // "name/split" -> SHA-256 of its annotation files
+  std::vector<std::string> notes;                         // what the loaders want a person to know
+
+  // Set by leave_out (pipeline/leakage/exclusions.h).
+  std::optional<Veto> veto;
+  std::optional<LeakageSummary> leakage;
+};
+
+// Loads every dataset and digests every picture (in parallel; unchanged files come from the cache). A record
+// whose role asks for a body and that gives no pose is failed. Throws std::runtime_error for an
+// annotation file that cannot be read, Interrupted. `load_bodies` is called for datasets with a body model;
+// an empty one leaves their bodies unchecked, for callers that look at pictures alone.
+Ingest ingest(const config::BuildConfig& config, manifests::DigestCache& digests,
+              const device::BodyMeshesLoader& load_bodies);
+
+// One dataset as ingest reads it: the chosen records where it is curated, without this machine's paths, and
+// the digest of its annotation files and that choice.
+struct IngestedDataset {
+  loaders::formats::Dataset dataset;
+  std::string annotations_sha256;
+};
+IngestedDataset read_dataset(const config::DatasetConfig& options, manifests::DigestCache& digests);
+
+}  // namespace q3d::pipeline::candidates

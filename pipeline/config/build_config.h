@@ -1,0 +1,129 @@
+// The configuration of a build: one JSON file, or several laid over each other. docs/config.md explains every
+// key.
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "filters/calibrate.h"
+#include "filters/guards.h"
+#include "loaders/formats/dataset.h"
+#include "pipeline/config/role.h"
+
+namespace q3d::pipeline::config {
+
+// How a dataset is read, and what the build makes of it.
+struct DatasetConfig : loaders::formats::DatasetOptions {
+  Role role = Role::pseudo;
+  std::filesystem::path curation{};  // list of `curate` that names the pictures to take; empty takes all
+  std::filesystem::path
+      body_model{};  // checks the file's 3D keypoints (pipeline/candidates/body_check.h); empty does not
+  bool keypoints_3d_of_body = false;  // labels get the body's instead of the file's
+};
+
+struct NetworkConfig {
+  std::filesystem::path checkpoint;  // safetensors, official parameter names
+  std::filesystem::path smal_asset;  // safetensors; see smal/tensors/asset.h
+  std::string device = "auto";       // auto, cpu, cuda, cuda:I
+  std::string dtype = "float32";     // float32, bfloat16
+  int batch = 8;                     // crops in one forward pass; batches never cross a unit
+  int compute_threads = 0;           // threads of one CPU operator; 0 = all cores. Part of the results' key.
+};
+
+struct TtaConfig {
+  std::string objective = "paper";  // paper, demo
+  double learning_rate = 1e-6;
+  double aux_weight = 5.0;
+  double reproj_weight = 0.5;
+  int iterations_min = 10;
+  int iterations_max = 60;
+  int batch = 8;
+};
+
+// Thresholds of one dataset; what is absent is as for the others.
+struct DatasetThresholds {
+  std::optional<double> tau_low;  // crop units; both or none
+  std::optional<double> tau_high;
+  std::optional<double> delta;
+};
+
+struct FilterConfig {
+  std::optional<double> tau_low;  // crop units; absent until calibrated
+  std::optional<double> tau_high;
+  double delta = 0.05;
+  std::map<std::string, DatasetThresholds> datasets;  // by the dataset's name
+};
+
+// The guards, all off: bounds on labels, and what changes adaptation.
+struct GuardConfig : filters::GuardBounds {
+  int iterations_full_at = 0;   // visible keypoints from which a sample gets all its iterations; 0 = off
+  double held_out_share = 0.0;  // of the visible keypoints; 0 = off
+  std::uint64_t held_out_seed = 0;
+  int held_out_patience = 0;     // iterations without a new least held-out error; 0 = no limit
+  std::filesystem::path priors;  // pose and shape priors; empty = the checkpoint's
+};
+
+// What `calibrate` aims at.
+struct CalibrateConfig : filters::TargetShares {
+  bool per_dataset = false;  // thresholds for each dataset instead of common ones
+};
+
+struct ShardConfig {
+  int unit_size = 512;          // candidates of one work unit = one shard
+  std::string images = "jpeg";  // jpeg, png or reference (no pictures in the shards)
+  int jpeg_quality = 95;
+  double crop_scale = 1.9;  // the stored crop's side over the box's longer side
+  int crop_min_side_px = 480;
+};
+
+// Pictures of the pool that are in these sets too are left out of the pseudo labels.
+struct LeakageConfig {
+  std::vector<DatasetConfig> test_sets;
+  int max_distance = 4;  // bits of 64 in which the hashes of one picture's copies may differ
+};
+
+struct BuildConfig {
+  std::string name = "quadruped3d";
+  std::string version = "1.0.0";  // semantic version of the dataset, the user's own
+  std::string profile = "paper";  // the set of guards that the config starts from; pipeline/config/profiles.h
+  std::vector<DatasetConfig> datasets;
+  NetworkConfig network;  // without paths when the config names none
+  TtaConfig tta;
+  FilterConfig filter;
+  GuardConfig guards;
+  ShardConfig shards;
+  CalibrateConfig calibrate;
+  std::optional<LeakageConfig> leakage;
+  std::filesystem::path veto;  // ids to leave out (pipeline/candidates/veto.h); empty when there are none
+  nlohmann::json as_written;   // the merged JSON, paths as the user wrote them
+};
+
+// Reads the files in order; a later file's keys replace an earlier one's. Relative paths are relative to the
+// file that names them. Throws ConfigError naming file, key, got and expected.
+BuildConfig load_build_config(const std::vector<std::filesystem::path>& files);
+
+// A list of datasets, as "datasets" holds them; paths are absolute already. Throws ConfigError.
+std::vector<DatasetConfig> parse_datasets(const nlohmann::json& list, const std::string& where);
+
+// Makes the paths of the datasets in object[key] absolute, where it is a list of them.
+void resolve_dataset_paths(nlohmann::json& object, const char* key, const std::filesystem::path& folder);
+
+// Checks and converts merged JSON; `where` names it in messages.
+BuildConfig parse_build_config(const nlohmann::json& json, const std::string& where);
+
+// Whether a dataset has the role `pseudo`. A build that needs no network takes no notice of `network`, `tta`,
+// `filter` and `guards`.
+bool needs_network(const BuildConfig& config);
+
+// Whether a guard that is on needs the pose and shape priors.
+bool uses_priors(const GuardConfig& guards);
+// The file that holds them: the guards' own, else the checkpoint, whose official form holds them too.
+std::filesystem::path priors_file(const BuildConfig& config);
+
+}  // namespace q3d::pipeline::config

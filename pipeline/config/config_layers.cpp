@@ -1,0 +1,69 @@
+#include "pipeline/config/config_layers.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "manifests/atomic_file.h"
+#include "pipeline/config/json_fields.h"
+#include "pipeline/run/errors.h"
+
+namespace q3d::pipeline::config {
+namespace {
+
+using nlohmann::json;
+namespace fs = std::filesystem;
+
+// Merging and printing recurse, so a file must not be able to choose how deep.
+constexpr int kMaxDepth = 32;
+
+json read_json(const fs::path& file) {
+  const auto check_depth = [&](int depth, json::parse_event_t, json&) {
+    if (depth <= kMaxDepth) return true;
+    throw run::ConfigError(
+        fmt::format("{}: got objects or lists within each other beyond {} levels, expected at "
+                    "most that",
+                    file.string(), kMaxDepth));
+  };
+  try {
+    return json::parse(manifests::read_file(file), check_depth, true, /*ignore_comments=*/true);
+  } catch (const json::exception& error) {  // also numbers beyond double, which are no parse_error
+    throw run::ConfigError(fmt::format("{}: not valid JSON: {}", file.string(), error.what()));
+  } catch (const std::runtime_error& error) {
+    throw run::ConfigError(error.what());
+  }
+}
+
+}  // namespace
+
+ConfigLayers read_config_layers(const std::vector<fs::path>& files,
+                                const std::function<void(json&, const fs::path&)>& resolve_paths) {
+  ConfigLayers layers{json::object(), json::object(), {}};
+  for (const fs::path& file : files) {
+    json layer = read_json(file);
+    if (!layer.is_object())
+      throw run::ConfigError(file.string() + ": expected a JSON object at the top level");
+    layers.as_written.merge_patch(layer);
+    resolve_paths(layer, fs::absolute(file).parent_path());
+    layers.resolved.merge_patch(layer);
+    layers.where += (layers.where.empty() ? "" : " + ") + file.string();
+  }
+  return layers;
+}
+
+void resolve_path(json& object, const char* key, const fs::path& folder) {
+  if (object.is_object() && object.contains(key) && object[key].is_string()) {
+    object[key] = (folder / object[key].get<std::string>()).lexically_normal().string();
+  }
+}
+
+void require_one_of(const std::string& value, const std::vector<std::string>& known,
+                    const std::string& where) {
+  if (std::find(known.begin(), known.end(), value) != known.end()) return;
+  std::string list;
+  for (const auto& word : known) list += (list.empty() ? "" : ", ") + word;
+  throw run::ConfigError(fmt::format("{}: \"{}\" is not known; expected one of: {}. Did you mean \"{}\"?",
+                                     where, value, list, nearest_word(value, known)));
+}
+
+}  // namespace q3d::pipeline::config

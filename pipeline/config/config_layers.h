@@ -1,0 +1,32 @@
+// What every configuration of this program shares: JSON files laid over each other, and words from a list.
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace q3d::pipeline::config {
+
+struct ConfigLayers {
+  nlohmann::json resolved;    // the merged JSON with absolute paths
+  nlohmann::json as_written;  // the same with paths as the user wrote them
+  std::string where;          // the files' names, for messages
+};
+
+// Reads the files in order; a later file's keys replace an earlier one's. `resolve_paths` makes the paths of
+// one file absolute, given the file's folder. Throws ConfigError naming the file.
+ConfigLayers read_config_layers(
+    const std::vector<std::filesystem::path>& files,
+    const std::function<void(nlohmann::json& layer, const std::filesystem::path& folder)>& resolve_paths);
+
+// Makes object[key] absolute where it is a text.
+void resolve_path(nlohmann::json& object, const char* key, const std::filesystem::path& folder);
+
+// Throws ConfigError that lists the known words and names the nearest.
+void require_one_of(const std::string& value, const std::vector<std::string>& known,
+                    const std::string& where);
+
+}  // namespace q3d::pipeline::config

@@ -1,0 +1,312 @@
+#include "pipeline/dataset/dataset_manifest.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include <cmath>
+#include <stdexcept>
+
+#include "manifests/atomic_file.h"
+#include "manifests/csv.h"
+#include "manifests/shard.h"
+#include "pipeline/config/effective_config.h"
+#include "pipeline/run/version.h"
+
+namespace q3d::pipeline::dataset {
+namespace {
+
+using manifests::csv_cell;
+using manifests::Verdict;
+using nlohmann::json;
+using nlohmann::ordered_json;
+
+ordered_json to_json(const Counts& counts) {
+  return {{"candidates", counts.candidates},
+          {"retained", counts.retained},
+          {"refined", counts.refined},
+          {"discarded", counts.discarded},
+          {"failed", counts.failed}};
+}
+
+bool is_kept(const manifests::Judgement& judgement) {
+  return judgement.verdict == Verdict::retained || judgement.verdict == Verdict::refined;
+}
+
+// Counts and mean errors by any label of the candidates.
+class Statistics {
+ public:
+  void add(const std::string& label, const manifests::Judgement& judgement) {
+    Group& group = groups_[label.empty() ? "unknown" : label];
+    group.counts.add(judgement.verdict);
+    if (is_kept(judgement)) {
+      group.initial.add(judgement.initial_error);
+      group.final.add(judgement.final_error);
+    }
+  }
+  ordered_json to_json() const {
+    ordered_json object = ordered_json::object();
+    for (const auto& [label, group] : groups_) {
+      ordered_json entry = dataset::to_json(group.counts);
+      if (group.initial.count > 0) entry["mean_initial_error_of_kept"] = group.initial.mean();
+      if (group.final.count > 0) entry["mean_final_error_of_kept"] = group.final.mean();
+      object[label] = std::move(entry);
+    }
+    return object;
+  }
+
+ private:
+  struct Mean {  // of the errors that were computed
+    double sum = 0.0;
+    std::int64_t count = 0;
+    void add(double error) {
+      if (std::isnan(error)) return;
+      sum += error;
+      ++count;
+    }
+    double mean() const { return sum / static_cast<double>(count); }
+  };
+  struct Group {
+    Counts counts;
+    Mean initial;
+    Mean final;
+  };
+  std::map<std::string, Group> groups_;
+};
+
+ordered_json statistics(const candidates::Ingest& ingest,
+                        const std::vector<manifests::Judgement>& judgements) {
+  Statistics all;
+  Statistics by_dataset;
+  Statistics by_family;
+  Statistics by_species;
+  std::map<std::string, std::int64_t> reasons;
+  for (std::size_t i = 0; i < judgements.size(); ++i) {
+    const manifests::SampleRecord& record = ingest.candidates[i].record;
+    all.add("all", judgements[i]);
+    by_dataset.add(record.dataset + "/" + record.split, judgements[i]);
+    by_family.add(std::string(manifests::to_string(record.family)), judgements[i]);
+    by_species.add(record.species, judgements[i]);
+    if (judgements[i].reason != manifests::Reason::none) {
+      ++reasons[std::string(manifests::to_string(judgements[i].reason))];
+    }
+  }
+  ordered_json object = all.to_json();
+  object["reasons"] = reasons;
+  object["by_dataset"] = by_dataset.to_json();
+  object["by_family"] = by_family.to_json();
+  object["by_species"] = by_species.to_json();
+  return object;
+}
+
+ordered_json count_labels(const candidates::Ingest& ingest,
+                          const std::vector<manifests::Judgement>& judgements) {
+  using manifests::LabelKind;
+  ordered_json labels = ordered_json::object();
+  for (const LabelKind kind :
+       {LabelKind::truth, LabelKind::retained, LabelKind::refined, LabelKind::two_d_only}) {
+    std::int64_t count = 0;
+    for (std::size_t i = 0; i < judgements.size(); ++i) {
+      count += is_kept(judgements[i]) &&
+               config::label_kind(ingest.candidates[i].role, judgements[i].verdict) == kind;
+    }
+    labels[std::string(manifests::to_string(kind))] = count;
+  }
+  return labels;
+}
+
+// Those of each dataset with pseudo labels; null where there is none.
+ordered_json describe_thresholds(const DatasetInputs& inputs) {
+  if (!config::needs_network(*inputs.config)) return nullptr;
+  ordered_json datasets = ordered_json::object();
+  for (const auto& [name, thresholds] : inputs.rules->thresholds) {
+    datasets[name] = {
+        {"tau_low", thresholds.tau_low}, {"tau_high", thresholds.tau_high}, {"delta", thresholds.delta}};
+  }
+  return datasets;
+}
+
+// Every guard with its value, 0 = off, without the path of the priors, which `provenance` has a digest of.
+ordered_json describe_guards(const DatasetInputs& inputs) {
+  if (!config::needs_network(*inputs.config)) return nullptr;
+  ordered_json guards = config::effective_guards(inputs.config->guards);
+  guards.erase("priors");
+  return guards;
+}
+
+ordered_json describe_veto(const std::optional<candidates::Veto>& veto) {
+  if (!veto) return nullptr;
+  return {{"sha256", veto->sha256}, {"ids", veto->reasons.size()}, {"matched", veto->matched}};
+}
+
+ordered_json describe_leakage(const DatasetInputs& inputs) {
+  const std::optional<candidates::LeakageSummary>& leakage = inputs.ingest->leakage;
+  if (!leakage) return nullptr;
+  return {{"test_sets", leakage->test_sets},
+          {"test_pictures", leakage->test_pictures},
+          {"max_distance", inputs.config->leakage->max_distance},
+          {"excluded", leakage->excluded},
+          {"pictures_alike_in_pool", leakage->in_groups}};
+}
+
+ordered_json text_or_null(const std::string& text) {
+  return text.empty() ? ordered_json(nullptr) : ordered_json(text);
+}
+
+// Shortest text that reads back as the same number; empty for NaN.
+std::string number(double value) {
+  return std::isnan(value) ? std::string() : fmt::format("{}", value);
+}
+
+}  // namespace
+
+void Counts::add(Verdict verdict) {
+  ++candidates;
+  switch (verdict) {
+    case Verdict::retained:
+      ++retained;
+      break;
+    case Verdict::refined:
+      ++refined;
+      break;
+    case Verdict::discarded:
+      ++discarded;
+      break;
+    case Verdict::failed:
+      ++failed;
+      break;
+  }
+}
+
+std::string content_id(const std::vector<ShardEntry>& shards) {
+  std::string text;
+  for (const ShardEntry& shard : shards) text += shard.sha256 + '\n';
+  return manifests::sha256(text);
+}
+
+std::string dataset_json(const DatasetInputs& inputs, const std::vector<manifests::Judgement>& judgements,
+                         const std::vector<ShardEntry>& shards, const std::string& verdicts_sha256) {
+  Counts counts;
+  for (const auto& judgement : judgements) counts.add(judgement.verdict);
+  ordered_json shard_list = ordered_json::array();
+  for (const ShardEntry& shard : shards) {
+    shard_list.push_back({{"file", shard.file},
+                          {"unit", shard.unit},
+                          {"rows", shard.rows},
+                          {"bytes", shard.bytes},
+                          {"sha256", shard.sha256}});
+  }
+  const stages::StageKeys& keys = *inputs.keys;
+  const ordered_json document = {{"format", kDatasetFormat},
+                                 {"schema", manifests::kShardSchema},
+                                 {"name", inputs.config->name},
+                                 {"version", inputs.config->version},
+                                 {"key", keys.dataset},
+                                 {"content_id", content_id(shards)},
+                                 {"toolkit", run::version()},
+                                 {"counts", to_json(counts)},
+                                 {"labels", count_labels(*inputs.ingest, judgements)},
+                                 {"profile", inputs.config->profile},
+                                 {"thresholds", describe_thresholds(inputs)},
+                                 {"guards", describe_guards(inputs)},
+                                 {"statistics", statistics(*inputs.ingest, judgements)},
+                                 {"provenance",
+                                  {{"config", inputs.config->as_written},
+                                   {"annotations", inputs.ingest->annotation_digests},
+                                   {"veto", describe_veto(inputs.ingest->veto)},
+                                   {"leakage", describe_leakage(inputs)},
+                                   {"checkpoint_sha256", text_or_null(inputs.assets->checkpoint)},
+                                   {"smal_asset_sha256", text_or_null(inputs.assets->smal_asset)},
+                                   {"priors_sha256", text_or_null(inputs.assets->priors)},
+                                   {"device", text_or_null(inputs.device_key)},
+                                   {"stage_keys",
+                                    {{"ingest", keys.ingest},
+                                     {"predict", keys.predict},
+                                     {"fidelity", keys.fidelity},
+                                     {"refine", keys.refine},
+                                     {"measure", text_or_null(keys.measure)},
+                                     {"shards", keys.shards}}}}},
+                                 {"verdicts", {{"file", "verdicts.csv"}, {"sha256", verdicts_sha256}}},
+                                 {"shards", shard_list}};
+  return document.dump(2) + "\n";
+}
+
+std::string verdicts_csv(const candidates::Ingest& ingest,
+                         const std::vector<manifests::Judgement>& judgements) {
+  std::string text =
+      "id,verdict,reason,initial_error,final_error,gain,iterations,best_iteration,dataset,split,source,"
+      "species,family,"
+      "shard,row,image_sha256,detail\n";
+  for (const candidates::Unit& unit : ingest.units) {
+    std::int64_t row = 0;
+    for (std::size_t i = unit.first; i < unit.first + unit.count; ++i) {
+      const manifests::SampleRecord& record = ingest.candidates[i].record;
+      const manifests::Judgement& judgement = judgements[i];
+      const bool kept = is_kept(judgement);
+      const bool judged = !std::isnan(judgement.initial_error);
+      text += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", csv_cell(record.id),
+                          manifests::to_string(judgement.verdict), manifests::to_string(judgement.reason),
+                          number(judgement.initial_error), number(judgement.final_error),
+                          number(judgement.gain), judged ? std::to_string(judgement.iterations) : "",
+                          judged ? std::to_string(judgement.best_iteration) : "", csv_cell(record.dataset),
+                          csv_cell(record.split), csv_cell(record.source), csv_cell(record.species),
+                          manifests::to_string(record.family), kept ? std::to_string(unit.index) : "",
+                          kept ? std::to_string(row) : "", ingest.candidates[i].image_sha256,
+                          csv_cell(judgement.detail));
+      if (kept) ++row;
+    }
+  }
+  return text;
+}
+
+std::filesystem::path dataset_folder(const std::filesystem::path& given) {
+  for (const auto& folder : {given, given / "latest"}) {
+    if (std::filesystem::exists(folder / "dataset.json")) return folder;
+  }
+  throw std::runtime_error(
+      fmt::format("{}: expected a dataset folder (with dataset.json) or an output folder of "
+                  "`build` (with latest/dataset.json)",
+                  given.string()));
+}
+
+DatasetManifest read_dataset_manifest(const std::filesystem::path& given) {
+  const std::filesystem::path file = dataset_folder(given) / "dataset.json";
+  try {
+    const json document = json::parse(manifests::read_file(file));
+    if (document.at("format") != kDatasetFormat) {
+      throw std::runtime_error(
+          fmt::format("format is {}, expected {}", document.at("format").dump(), kDatasetFormat));
+    }
+    DatasetManifest manifest;
+    manifest.schema = document.at("schema").get<int>();
+    if (manifest.schema != manifests::kShardSchema) {
+      throw std::runtime_error(
+          fmt::format("schema is {}, this toolkit reads {}; use the toolkit version that wrote it "
+                      "({})",
+                      manifest.schema, manifests::kShardSchema, document.value("toolkit", "?")));
+    }
+    manifest.name = document.at("name").get<std::string>();
+    manifest.version = document.at("version").get<std::string>();
+    manifest.key = document.at("key").get<std::string>();
+    manifest.content_id = document.at("content_id").get<std::string>();
+    const json& counts = document.at("counts");
+    manifest.counts = {counts.at("candidates").get<std::int64_t>(), counts.at("retained").get<std::int64_t>(),
+                       counts.at("refined").get<std::int64_t>(), counts.at("discarded").get<std::int64_t>(),
+                       counts.at("failed").get<std::int64_t>()};
+    manifest.labels = document.at("labels").get<std::map<std::string, std::int64_t>>();
+    manifest.verdicts_sha256 = document.at("verdicts").at("sha256").get<std::string>();
+    manifest.reasons = document.at("statistics").at("reasons").get<std::map<std::string, std::int64_t>>();
+    for (const json& shard : document.at("shards")) {
+      manifest.shards.push_back({shard.at("file").get<std::string>(), shard.at("sha256").get<std::string>(),
+                                 shard.at("bytes").get<std::int64_t>(), shard.at("rows").get<std::int64_t>(),
+                                 shard.at("unit").get<std::int64_t>()});
+    }
+    return manifest;
+  } catch (const json::exception& error) {
+    throw std::runtime_error(fmt::format("{}: not a readable dataset.json: {}", file.string(), error.what()));
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(fmt::format("{}: {}", file.string(), error.what()));
+  }
+}
+
+}  // namespace q3d::pipeline::dataset

@@ -1,0 +1,234 @@
+#include "pipeline/dataset/verify.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <mutex>
+#include <set>
+#include <stdexcept>
+
+#include "filters/metrics.h"
+#include "loaders/pictures/encode.h"
+#include "manifests/atomic_file.h"
+#include "manifests/digest.h"
+#include "manifests/shard.h"
+#include "pipeline/dataset/dataset_manifest.h"
+#include "pipeline/run/interrupt.h"
+#include "pipeline/run/progress.h"
+#include "pipeline/unit/annotated_body.h"
+#include "pipeline/unit/unit_steps.h"
+
+namespace q3d::pipeline::dataset {
+namespace {
+
+namespace fs = std::filesystem;
+
+// float32 projection and its double re-computation differ by rounding only: of numbers below 1 by this, of
+// larger ones by as much of them.
+constexpr double kProjectionTolerance = 1e-4;
+constexpr float kRotationTolerance = 1e-5F;
+constexpr double kFocalInCropUnits = 1000.0 / 256.0;
+
+class Verifier {
+ public:
+  explicit Verifier(const fs::path& given)
+      : folder_(dataset_folder(given)), manifest_(read_dataset_manifest(folder_)) {
+    summary_.folder = folder_;
+  }
+
+  VerifySummary run(bool quiet) {
+    run::Progress progress("shards", static_cast<std::int64_t>(manifest_.shards.size()), quiet);
+    for (const ShardEntry& entry : manifest_.shards) {
+      run::throw_if_interrupted();
+      check_shard(entry);
+      progress.advance(1);
+    }
+    check_books();
+    check_labels();
+    check_strays();
+    return summary_;
+  }
+
+ private:
+  void problem(const std::string& text) {
+    const std::lock_guard lock(mutex_);
+    summary_.problems.push_back(text);
+  }
+
+  void check_shard(const ShardEntry& entry) {
+    ++summary_.shards;
+    const fs::path path = folder_ / entry.file;
+    try {
+      const std::string digest = manifests::sha256_file(path);
+      if (digest != entry.sha256) {
+        problem(fmt::format("{}: SHA-256 is {}, dataset.json says {}", entry.file, digest, entry.sha256));
+        return;
+      }
+      const manifests::Shard shard = manifests::read_shard(path);
+      if (static_cast<std::int64_t>(shard.samples.size()) != entry.rows) {
+        problem(
+            fmt::format("{}: {} rows, dataset.json says {}", entry.file, shard.samples.size(), entry.rows));
+      }
+      if (shard.header.unit != entry.unit) {
+        problem(fmt::format("{}: made from unit {}, dataset.json says {}", entry.file, shard.header.unit,
+                            entry.unit));
+      }
+      check_samples(entry, shard);
+    } catch (const std::runtime_error& error) {
+      problem(error.what());
+    }
+  }
+
+  void check_samples(const ShardEntry& entry, const manifests::Shard& shard) {
+    tbb::parallel_for(std::size_t{0}, shard.samples.size(), [&](std::size_t i) {
+      const manifests::ShardSample& sample = shard.samples[i];
+      check_picture(entry, sample);
+      check_label(entry, sample);
+    });
+    for (const manifests::ShardSample& sample : shard.samples) {
+      ++summary_.samples;
+      ++labels_[std::string(manifests::to_string(sample.label_kind))];
+      summary_.pictures += sample.crop.empty() ? 0 : 1;
+      if (!ids_.insert(sample.record.id).second)
+        problem(entry.file + ": sample " + sample.record.id + " occurs twice");
+      labelled_.add(sample.judgement.verdict);
+    }
+  }
+
+  void check_picture(const ShardEntry& entry, const manifests::ShardSample& sample) {
+    if (sample.crop.empty()) return;
+    try {
+      const cv::Mat picture = loaders::pictures::decode_stored(sample.crop, 3);
+      if (picture.cols != sample.crop_side_px || picture.rows != sample.crop_side_px) {
+        problem(fmt::format("{}: {}: the stored crop is {} x {} px, expected {} square", entry.file,
+                            sample.record.id, picture.cols, picture.rows, sample.crop_side_px));
+      }
+    } catch (const std::runtime_error& error) {
+      problem(fmt::format("{}: {}: {}", entry.file, sample.record.id, error.what()));
+    }
+  }
+
+  void check_label(const ShardEntry& entry, const manifests::ShardSample& sample) {
+    using manifests::LabelKind;
+    const bool is_predicted =
+        sample.label_kind == LabelKind::retained || sample.label_kind == LabelKind::refined;
+    const bool has_body = sample.has_pose || sample.has_betas || sample.has_keypoints_3d;
+    const bool is_whole = sample.has_pose && sample.has_betas && sample.has_keypoints_3d;
+    if ((is_predicted && !is_whole) || (sample.label_kind == LabelKind::truth && !sample.has_pose) ||
+        (sample.label_kind == LabelKind::two_d_only && has_body)) {
+      problem(fmt::format("{}: {}: a {} label with has_pose {}, has_betas {}, has_keypoints_3d {}",
+                          entry.file, sample.record.id, manifests::to_string(sample.label_kind),
+                          sample.has_pose, sample.has_betas, sample.has_keypoints_3d));
+    }
+    if (sample.label_kind == LabelKind::truth) check_truth(entry, sample);
+    if (is_predicted || unit::has_projection(sample.projected_2d)) check_projection(entry, sample);
+  }
+
+  // The label of a truth is the annotation's own body.
+  void check_truth(const ShardEntry& entry, const manifests::ShardSample& sample) {
+    const auto& truth = sample.record.truth;
+    const device::BodyPrediction body = truth ? unit::annotated_body(*truth) : unit::no_body();
+    const bool is_equal =
+        truth && truth->has_pose == sample.has_pose && truth->has_betas == sample.has_betas &&
+        truth->has_keypoints_3d == sample.has_keypoints_3d &&
+        std::equal(body.rotations.begin(), body.rotations.end(), sample.pose.begin(),
+                   [](float a, float b) { return std::abs(a - b) <= kRotationTolerance; }) &&
+        body.betas == sample.betas && body.translation == sample.trans &&
+        body.keypoints_3d == sample.keypoints_3d &&
+        unit::has_projection(body.keypoints_2d) == unit::has_projection(sample.projected_2d);
+    if (is_equal) return;
+    problem(fmt::format("{}: {}: the label is not the body of the columns truth_*", entry.file,
+                        sample.record.id));
+  }
+
+  // The stored 2D points are the projection of the stored body, and the error is theirs.
+  void check_projection(const ShardEntry& entry, const manifests::ShardSample& sample) {
+    double worst = 0.0;  // relative for what lies far outside the crop
+    for (int k = 0; k < manifests::kNumKeypoints; ++k) {
+      const auto at = static_cast<std::size_t>(k);
+      const double z = double{sample.keypoints_3d[3 * at + 2]} + sample.trans[2];
+      for (std::size_t axis = 0; axis < 2; ++axis) {
+        const double point = double{sample.keypoints_3d[3 * at + axis]} + sample.trans[axis];
+        const double projected = kFocalInCropUnits * point / z;
+        const double difference =
+            std::abs(projected - sample.projected_2d[2 * at + axis]) / std::max(1.0, std::abs(projected));
+        worst =
+            std::isnan(difference) ? std::numeric_limits<double>::infinity() : std::max(worst, difference);
+      }
+    }
+    if (!(worst <= kProjectionTolerance)) {
+      problem(fmt::format("{}: {}: projected_2d differs from the projected body by {} crop units", entry.file,
+                          sample.record.id, worst));
+    }
+    const auto error = filters::projection_error(sample.projected_2d, unit::crop_keypoints(sample.record));
+    if (!error ||
+        !(std::abs(*error - sample.judgement.final_error) <= kProjectionTolerance * std::max(1.0, *error))) {
+      problem(fmt::format("{}: {}: final_error is {}, recomputed {}", entry.file, sample.record.id,
+                          sample.judgement.final_error, error.value_or(std::nan(""))));
+    }
+  }
+
+  void check_books() {
+    if (content_id(manifest_.shards) != manifest_.content_id) {
+      problem("dataset.json: content_id is not the hash of the shard digests that it lists");
+    }
+    try {
+      const std::string csv = manifests::read_file(folder_ / "verdicts.csv");
+      if (manifests::sha256(csv) != manifest_.verdicts_sha256) {
+        problem("verdicts.csv: its SHA-256 is not the one in dataset.json");
+      }
+    } catch (const std::runtime_error& error) {
+      problem(error.what());
+    }
+    const Counts& counts = manifest_.counts;
+    if (counts.retained + counts.refined + counts.discarded + counts.failed != counts.candidates) {
+      problem(fmt::format(
+          "dataset.json: {} retained + {} refined + {} discarded + {} failed are not {} candidates",
+          counts.retained, counts.refined, counts.discarded, counts.failed, counts.candidates));
+    }
+    if (labelled_.retained != counts.retained || labelled_.refined != counts.refined) {
+      problem(fmt::format("the shards hold {} retained and {} refined samples, dataset.json says {} and {}",
+                          labelled_.retained, labelled_.refined, counts.retained, counts.refined));
+    }
+  }
+
+  void check_labels() {
+    for (const auto& [kind, count] : manifest_.labels) {
+      if (labels_[kind] != count) {
+        problem(
+            fmt::format("the shards hold {} {} labels, dataset.json says {}", labels_[kind], kind, count));
+      }
+    }
+  }
+
+  // A file that dataset.json does not list is not part of the dataset.
+  void check_strays() {
+    std::set<std::string> listed;
+    for (const ShardEntry& entry : manifest_.shards) listed.insert(fs::path(entry.file).filename().string());
+    std::error_code error;
+    for (const auto& file : fs::directory_iterator(folder_ / "shards", error)) {
+      const std::string name = file.path().filename().string();
+      if (listed.count(name) == 0) problem("shards/" + name + ": not listed in dataset.json");
+    }
+  }
+
+  fs::path folder_;
+  DatasetManifest manifest_;
+  VerifySummary summary_;
+  std::mutex mutex_;  // guards summary_.problems
+  std::set<std::string> ids_;
+  Counts labelled_;
+  std::map<std::string, std::int64_t> labels_;  // by kind
+};
+
+}  // namespace
+
+VerifySummary verify(const fs::path& given, bool quiet) {
+  return Verifier(given).run(quiet);
+}
+
+}  // namespace q3d::pipeline::dataset

@@ -1,0 +1,73 @@
+// The network as the pipeline sees it: plain pictures and keypoints in, plain numbers out, without LibTorch.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "filters/keypoint_choice.h"
+#include "manifests/sample.h"
+
+namespace q3d::pipeline::device {
+
+// One body as the network sees it. Rotations are row-major 3x3 matrices, joint 0 is the global orientation;
+// keypoints_2d are in crop units, everything in 3D in the crop camera's frame and SMAL units.
+struct BodyPrediction {
+  std::array<float, manifests::kNumJoints * 9> rotations{};
+  std::array<float, manifests::kNumBetas> betas{};
+  std::array<float, 3> camera{};
+  std::array<float, 3> translation{};
+  std::array<float, manifests::kNumKeypoints * 3> keypoints_3d{};
+  std::array<float, manifests::kNumKeypoints * 2> keypoints_2d{};
+  std::array<float, manifests::kNumKeypoints * 2> aux_keypoints_2d{};
+};
+bool is_finite(const BodyPrediction& body);
+
+using CropKeypoints = std::array<float, manifests::kNumKeypoints * 3>;  // x, y in crop units and a weight
+using PatchView = std::span<const std::uint8_t>;                        // 256 x 256 x 3 RGB, row-major
+
+struct AdaptRequest {
+  PatchView patch;
+  CropKeypoints keypoints{};
+  int iterations = 10;
+  double stop_below = 0.0;  // crop units; 0 = never
+  double min_gain = 0.0;    // give up after gain_window iterations below this relative gain; 0 = never
+  int gain_window = 10;
+  // Visible keypoints that the objective does not see. Where there are any, the best iterate is the one of
+  // least error on them.
+  filters::KeypointFlags held_out{};
+  int patience = 0;  // stop after so many iterations without a new least held-out error; 0 = never
+};
+
+struct AdaptOutcome {
+  BodyPrediction best;
+  std::vector<double> curve;           // L_proj of iterates 0..n over all visible keypoints, crop units
+  std::vector<double> held_out_curve;  // of the held-out ones alone; empty where there are none
+  int best_iteration = 0;
+  std::vector<BodyPrediction> snapshots;  // of the iterates that were asked for
+};
+
+// A loaded network. One caller at a time. Batches are formed from consecutive elements of the span, so a
+// result depends on nothing but the span. pipeline/network makes one.
+class Network {
+ public:
+  Network() = default;
+  Network(const Network&) = delete;
+  Network& operator=(const Network&) = delete;
+  virtual ~Network() = default;
+
+  virtual std::vector<BodyPrediction> predict(std::span<const PatchView> patches) = 0;
+  // `snapshots`: iterates to keep beside the best one, ascending; an instance that stopped before shows its
+  // last iterate.
+  virtual std::vector<AdaptOutcome> adapt(std::span<const AdaptRequest> requests,
+                                          const std::vector<int>& snapshots = {}) = 0;
+
+  // "cpu (2 threads)", "cuda:0 NVIDIA H100 80GB HBM3": for people.
+  virtual const std::string& device_description() const = 0;
+  // A GPU that is present but cannot be used, and why; else empty.
+  virtual const std::string& device_warning() const = 0;
+};
+
+}  // namespace q3d::pipeline::device

@@ -1,0 +1,88 @@
+#include "pipeline/leakage/exclusions.h"
+
+#include <fmt/format.h>
+
+#include "pipeline/leakage/leakage.h"
+#include "pipeline/leakage/leakage_lists.h"
+
+namespace q3d::pipeline::leakage {
+namespace {
+
+using manifests::Reason;
+
+void leave_out_leaks(const config::BuildConfig& config, manifests::DigestCache& digests,
+                     const std::filesystem::path& out, bool quiet, candidates::Ingest& ingest) {
+  if (!config.leakage) return;
+  LeakageReport report = find_leaks(*config.leakage, ingest, digests, out, quiet);
+  write_leakage_lists(out, report, ingest);
+  std::size_t others = 0;
+  for (const Leak& leak : report.leaks) {
+    candidates::Candidate& candidate = ingest.candidates[leak.candidate];
+    if (candidate.role != config::Role::pseudo) {
+      ++others;
+      continue;
+    }
+    candidate.exclusion = {Reason::in_test_split,
+                           fmt::format("its picture is that of {} ({}: {})", leak.test_id,
+                                       to_string(leak.evidence), leak.detail)};
+    ++report.summary.excluded;
+  }
+  ingest.notes.insert(ingest.notes.end(), report.notes.begin(), report.notes.end());
+  ingest.notes.push_back(
+      fmt::format("leakage: {} pseudo labels are left out, since their picture is in a test set",
+                  report.summary.excluded));
+  if (others > 0) {
+    ingest.notes.push_back(fmt::format(
+        "leakage: {} samples that bring their own labels have a picture of a test set too, and are kept "
+        "(leaks.csv in the output folder lists them)",
+        others));
+  }
+  if (report.summary.groups > 0) {
+    ingest.notes.push_back(
+        fmt::format("leakage: {} pictures of the pool look like another, in {} groups, and are kept "
+                    "(duplicates.csv in the output folder lists them)",
+                    report.summary.in_groups, report.summary.groups));
+  }
+  ingest.leakage = std::move(report.summary);
+}
+
+// Over what a leak says, since it is the user's own word.
+void apply_veto(const std::filesystem::path& file, candidates::Ingest& ingest) {
+  if (file.empty()) return;
+  candidates::Veto& veto = ingest.veto.emplace(candidates::read_veto(file));
+  for (candidates::Candidate& candidate : ingest.candidates) {
+    const auto found = veto.reasons.find(candidate.record.id);
+    if (found == veto.reasons.end()) continue;
+    candidate.exclusion = {Reason::vetoed, found->second};
+    ++veto.matched;
+  }
+  if (veto.matched < veto.reasons.size()) {
+    ingest.notes.push_back(fmt::format("veto {}: {} of its {} ids are no candidate's",
+                                       file.filename().string(), veto.reasons.size() - veto.matched,
+                                       veto.reasons.size()));
+  }
+}
+
+// What is left out changes a unit's labels, not its predictions.
+std::string label_digest(const candidates::Unit& unit, const std::vector<candidates::Candidate>& candidates) {
+  std::string text;
+  for (std::size_t i = unit.first; i < unit.first + unit.count; ++i) {
+    const candidates::Exclusion& exclusion = candidates[i].exclusion;
+    if (exclusion.reason == Reason::none) continue;
+    text +=
+        fmt::format("{} {} {}\n", i - unit.first, manifests::to_string(exclusion.reason), exclusion.detail);
+  }
+  return text.empty() ? unit.input_digest : manifests::sha256(unit.input_digest + '\n' + text);
+}
+
+}  // namespace
+
+void leave_out(const config::BuildConfig& config, manifests::DigestCache& digests,
+               const std::filesystem::path& out, bool quiet, candidates::Ingest& ingest) {
+  leave_out_leaks(config, digests, out, quiet, ingest);
+  apply_veto(config.veto, ingest);
+  digests.save();
+  for (candidates::Unit& unit : ingest.units) unit.label_digest = label_digest(unit, ingest.candidates);
+}
+
+}  // namespace q3d::pipeline::leakage

@@ -1,0 +1,116 @@
+#include "pipeline/leakage/picture_hashes.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <charconv>
+#include <fstream>
+#include <set>
+#include <stdexcept>
+#include <string_view>
+
+#include "loaders/pictures/image.h"
+#include "loaders/pictures/perceptual_hash.h"
+#include "manifests/atomic_file.h"
+#include "manifests/checked_line.h"
+#include "pipeline/run/interrupt.h"
+#include "pipeline/run/progress.h"
+
+namespace q3d::pipeline::leakage {
+namespace {
+
+using manifests::PictureHash;
+
+// Another name when the hash of a picture changes: lines of another method are dropped.
+constexpr std::string_view kMethod = "dct1";
+
+constexpr std::size_t kBlock = 4096;  // pictures between two writes of the file
+
+constexpr std::size_t kShaDigits = 64;
+constexpr std::size_t kHashDigits = 16;
+
+// "dct1 <sha256> <upright> <mirrored>", or "dct1 <sha256> -" for a picture without a hash.
+std::string line_of(const std::string& sha256, const std::optional<PictureHash>& hash) {
+  if (!hash) return fmt::format("{} {} -", kMethod, sha256);
+  return fmt::format("{} {} {:016x} {:016x}", kMethod, sha256, hash->upright, hash->mirrored);
+}
+
+bool parse_hash(std::string_view digits, std::uint64_t& hash) {
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), hash, 16);
+  return error == std::errc() && end == digits.data() + digits.size();
+}
+
+std::optional<PictureHash> hash_file(const std::string& path) {
+  const loaders::pictures::DecodedImage image = loaders::pictures::decode_image(std::filesystem::path(path));
+  if (image.failure != manifests::Reason::none) return std::nullopt;
+  return loaders::pictures::perceptual_hash(image.rgb);
+}
+
+}  // namespace
+
+PictureHashes::PictureHashes(std::filesystem::path file) : file_(std::move(file)) {
+  if (!std::filesystem::exists(file_)) return;
+  const std::string content = manifests::read_file(file_);
+  const std::size_t prefix = kMethod.size() + 1;
+  std::string_view rest = content;
+  while (!rest.empty()) {
+    const std::size_t end = std::min(rest.find('\n'), rest.size());
+    const auto payload = manifests::open_line(rest.substr(0, end));
+    rest.remove_prefix(std::min(end + 1, rest.size()));
+    if (!payload || !payload->starts_with(kMethod) || payload->size() < prefix + kShaDigits + 2) continue;
+    const std::string sha256(payload->substr(prefix, kShaDigits));
+    const std::string_view hashes = payload->substr(prefix + kShaDigits + 1);
+    PictureHash hash;
+    if (hashes == "-") {
+      hashes_[sha256] = std::nullopt;
+    } else if (hashes.size() == 2 * kHashDigits + 1 &&
+               parse_hash(hashes.substr(0, kHashDigits), hash.upright) &&
+               parse_hash(hashes.substr(kHashDigits + 1), hash.mirrored)) {
+      hashes_[sha256] = hash;
+    }
+  }
+}
+
+void PictureHashes::add(const std::vector<PictureFile>& pictures, bool quiet) {
+  std::vector<const PictureFile*> fresh;
+  std::set<std::string_view> seen;
+  for (const PictureFile& picture : pictures) {
+    if (hashes_.count(picture.sha256) == 0 && seen.insert(picture.sha256).second) fresh.push_back(&picture);
+  }
+  if (fresh.empty()) return;
+  run::Progress progress("pictures hashed", static_cast<std::int64_t>(fresh.size()), quiet);
+  for (std::size_t first = 0; first < fresh.size(); first += kBlock) {
+    const std::vector<const PictureFile*> block(
+        fresh.begin() + static_cast<std::ptrdiff_t>(first),
+        fresh.begin() + static_cast<std::ptrdiff_t>(std::min(first + kBlock, fresh.size())));
+    std::vector<std::optional<PictureHash>> made(block.size());
+    tbb::parallel_for(std::size_t{0}, block.size(), [&](std::size_t i) {
+      if (run::interrupted()) return;
+      made[i] = hash_file(block[i]->path);
+      progress.advance(1);
+    });
+    run::throw_if_interrupted();
+    for (std::size_t i = 0; i < block.size(); ++i) hashes_[block[i]->sha256] = made[i];
+    append(block);
+  }
+}
+
+std::optional<PictureHash> PictureHashes::find(const std::string& sha256) const {
+  const auto found = hashes_.find(sha256);
+  return found == hashes_.end() ? std::nullopt : found->second;
+}
+
+// A line that a kill cuts short fails its check when read, and so does the one that is appended to it: two
+// pictures to hash again.
+void PictureHashes::append(const std::vector<const PictureFile*>& pictures) const {
+  std::string lines;
+  for (const PictureFile* picture : pictures) {
+    lines += manifests::seal_line(line_of(picture->sha256, hashes_.at(picture->sha256)));
+  }
+  std::ofstream stream(file_, std::ios::app | std::ios::binary);
+  stream << lines << std::flush;
+  if (!stream) throw std::runtime_error(fmt::format("{}: cannot be written to", file_.string()));
+}
+
+}  // namespace q3d::pipeline::leakage

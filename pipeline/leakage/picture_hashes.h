@@ -1,0 +1,39 @@
+// Perceptual hashes of pictures on disk, made once for each content.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "manifests/picture_hash.h"
+
+namespace q3d::pipeline::leakage {
+
+struct PictureFile {
+  std::string path;
+  std::string sha256;
+};
+
+// Remembers hashes by the pictures' SHA-256 in one file of checked lines, which grows as pictures are hashed:
+// a run that is stopped loses the last few thousand at most.
+class PictureHashes {
+ public:
+  // Loads the file if it is there; a damaged line is dropped. Throws std::runtime_error when unreadable.
+  explicit PictureHashes(std::filesystem::path file);
+
+  // Hashes, in parallel, those that are not known yet, and appends them to the file. A picture that cannot be
+  // decoded, or is one colour, has no hash. Throws std::runtime_error, Interrupted.
+  void add(const std::vector<PictureFile>& pictures, bool quiet);
+
+  std::optional<manifests::PictureHash> find(const std::string& sha256) const;
+
+ private:
+  void append(const std::vector<const PictureFile*>& pictures) const;
+
+  std::filesystem::path file_;
+  std::map<std::string, std::optional<manifests::PictureHash>> hashes_;  // by SHA-256
+};
+
+}  // namespace q3d::pipeline::leakage

@@ -1,0 +1,204 @@
+#include "pipeline/network/torch_network.h"
+
+#include <fmt/format.h>
+#include <torch/torch.h>
+
+#include <algorithm>
+#include <cmath>
+#include <thread>
+
+#include "loaders/pictures/crop.h"
+#include "model/config.h"
+#include "model/device.h"
+#include "model/prima.h"
+#include "model/priors.h"
+#include "model/tta.h"
+#include "pipeline/run/errors.h"
+
+namespace q3d::pipeline::network {
+namespace {
+
+constexpr std::int64_t kSide = loaders::pictures::kPatchSidePx;
+
+template <std::size_t N>
+void copy_row(const torch::Tensor& batch, std::int64_t row, std::array<float, N>& into) {
+  const torch::Tensor flat = batch[row].flatten();
+  TORCH_CHECK(flat.numel() == static_cast<std::int64_t>(N), "prediction row has ", flat.numel(), " numbers");
+  std::copy_n(flat.data_ptr<float>(), N, into.begin());
+}
+
+torch::Tensor on_host(const torch::Tensor& tensor) {
+  return tensor.to(torch::kCPU, torch::kFloat32).contiguous();
+}
+
+// Splits a batch into rows; one device-to-host copy a field.
+void append_rows(const model::Prediction& batch, std::vector<device::BodyPrediction>& rows) {
+  const torch::Tensor rotations = on_host(batch.rotations);
+  const torch::Tensor betas = on_host(batch.betas);
+  const torch::Tensor camera = on_host(batch.camera);
+  const torch::Tensor translation = on_host(batch.translation);
+  const torch::Tensor keypoints_3d = on_host(batch.keypoints_3d);
+  const torch::Tensor keypoints_2d = on_host(batch.keypoints_2d);
+  const torch::Tensor aux_keypoints_2d = on_host(batch.aux_keypoints_2d);
+  for (std::int64_t i = 0; i < rotations.size(0); ++i) {
+    device::BodyPrediction& row = rows.emplace_back();
+    copy_row(rotations, i, row.rotations);
+    copy_row(betas, i, row.betas);
+    copy_row(camera, i, row.camera);
+    copy_row(translation, i, row.translation);
+    copy_row(keypoints_3d, i, row.keypoints_3d);
+    copy_row(keypoints_2d, i, row.keypoints_2d);
+    copy_row(aux_keypoints_2d, i, row.aux_keypoints_2d);
+  }
+}
+
+// (B, 3, 256, 256) uint8 from interleaved rows.
+torch::Tensor stack_patches(std::span<const device::PatchView> patches) {
+  torch::Tensor batch =
+      torch::empty({static_cast<std::int64_t>(patches.size()), kSide, kSide, 3}, torch::kUInt8);
+  std::uint8_t* out = batch.data_ptr<std::uint8_t>();
+  for (const device::PatchView& patch : patches) {
+    TORCH_CHECK(patch.size() == static_cast<std::size_t>(kSide * kSide * 3), "patch has ", patch.size(),
+                " bytes");
+    out = std::copy(patch.begin(), patch.end(), out);
+  }
+  return batch.permute({0, 3, 1, 2}).contiguous();
+}
+
+model::DeviceChoice choose_device(const std::string& name) {
+  try {
+    return model::choose_device(name);
+  } catch (const std::invalid_argument& error) {
+    throw run::ConfigError(error.what());
+  }
+}
+
+int resolved_threads(int wanted) {
+  return wanted > 0 ? wanted : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+}
+
+model::TtaOptions tta_options(const config::TtaConfig& tta) {
+  model::TtaOptions options;
+  options.objective = tta.objective == "demo" ? model::TtaObjective::demo : model::TtaObjective::paper;
+  options.learning_rate = tta.learning_rate;
+  options.aux_weight = tta.aux_weight;
+  options.reproj_weight = tta.reproj_weight;
+  return options;
+}
+
+model::TtaSchedule schedule_of(const device::AdaptRequest& request) {
+  model::TtaSchedule schedule;
+  schedule.iterations = request.iterations;
+  schedule.stop_below = request.stop_below;
+  schedule.min_gain = request.min_gain;
+  schedule.gain_window = request.gain_window;
+  schedule.patience = request.patience;
+  for (std::size_t k = 0; k < request.held_out.size(); ++k) schedule.held_out[k] = request.held_out[k];
+  return schedule;
+}
+
+class TorchNetwork : public device::Network {
+ public:
+  TorchNetwork(const config::NetworkConfig& network, const config::TtaConfig& tta)
+      : threads_(resolved_threads(network.compute_threads)),
+        predict_batch_(static_cast<std::size_t>(network.batch)),
+        adapt_batch_(static_cast<std::size_t>(tta.batch)),
+        options_(tta_options(tta)),
+        device_(choose_device(network.device)),
+        prima_(model::Prima::load(network.checkpoint, network.smal_asset, device_.device,
+                                  network.dtype == "bfloat16" ? torch::kBFloat16 : torch::kFloat32)) {}
+
+  std::vector<device::BodyPrediction> predict(std::span<const device::PatchView> patches) override;
+  std::vector<device::AdaptOutcome> adapt(std::span<const device::AdaptRequest> requests,
+                                          const std::vector<int>& snapshots) override;
+  const std::string& device_description() const override { return device_.description; }
+  const std::string& device_warning() const override { return device_.warning; }
+
+ private:
+  // OpenMP's thread count belongs to the calling thread, so it is set wherever work begins.
+  void begin() const { model::configure_compute(threads_); }
+
+  int threads_;
+  std::size_t predict_batch_;
+  std::size_t adapt_batch_;
+  model::TtaOptions options_;
+  model::DeviceChoice device_;
+  model::Prima prima_;
+};
+
+std::vector<device::BodyPrediction> TorchNetwork::predict(std::span<const device::PatchView> patches) {
+  begin();
+  const torch::InferenceMode no_gradients;
+  std::vector<device::BodyPrediction> rows;
+  rows.reserve(patches.size());
+  for (std::size_t first = 0; first < patches.size(); first += predict_batch_) {
+    const auto batch = patches.subspan(first, std::min(predict_batch_, patches.size() - first));
+    append_rows(prima_.predict(prima_.encode(prima_.normalise(stack_patches(batch)))), rows);
+  }
+  return rows;
+}
+
+std::vector<device::AdaptOutcome> TorchNetwork::adapt(std::span<const device::AdaptRequest> requests,
+                                                      const std::vector<int>& snapshots) {
+  begin();
+  model::TtaOptions options = options_;
+  options.snapshots = snapshots;
+  std::vector<device::AdaptOutcome> outcomes;
+  outcomes.reserve(requests.size());
+  for (std::size_t first = 0; first < requests.size(); first += adapt_batch_) {
+    const auto batch = requests.subspan(first, std::min(adapt_batch_, requests.size() - first));
+    std::vector<device::PatchView> patches;
+    std::vector<model::TtaSchedule> schedules;
+    torch::Tensor keypoints =
+        torch::empty({static_cast<std::int64_t>(batch.size()), manifests::kNumKeypoints, 3}, torch::kFloat32);
+    float* out = keypoints.data_ptr<float>();
+    for (const device::AdaptRequest& request : batch) {
+      patches.push_back(request.patch);
+      schedules.push_back(schedule_of(request));
+      out = std::copy(request.keypoints.begin(), request.keypoints.end(), out);
+    }
+    const model::ImageFeatures features = [&] {
+      const torch::NoGradGuard no_gradients;
+      return prima_.encode(prima_.normalise(stack_patches(patches)));
+    }();
+    const model::TtaResult result = model::adapt(prima_, features, keypoints, schedules, options);
+    std::vector<device::BodyPrediction> rows;
+    append_rows(result.best, rows);
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      outcomes.push_back({rows[i], result.l_proj[i], result.held_out[i], result.best_iteration[i], {}});
+    }
+    for (const model::Prediction& snapshot : result.snapshots) {
+      std::vector<device::BodyPrediction> iterates;
+      append_rows(snapshot, iterates);
+      for (std::size_t i = 0; i < iterates.size(); ++i) {
+        outcomes[first + i].snapshots.push_back(iterates[i]);
+      }
+    }
+  }
+  return outcomes;
+}
+
+}  // namespace
+
+std::unique_ptr<device::Network> load_network(const config::NetworkConfig& network,
+                                              const config::TtaConfig& tta) {
+  return std::make_unique<TorchNetwork>(network, tta);
+}
+
+std::string device_key(const config::NetworkConfig& network) {
+  const bool on_cpu = choose_device(network.device).device.is_cpu();
+  return on_cpu ? fmt::format("cpu-{}", resolved_threads(network.compute_threads)) : "cuda";
+}
+
+void write_initial_checkpoint(const std::filesystem::path& path, const std::string& size,
+                              std::uint64_t seed) {
+  model::PrimaConfig config;
+  try {
+    config = model::named_config(size);
+  } catch (const std::invalid_argument& error) {
+    throw run::ConfigError(error.what());
+  }
+  model::write_initial_checkpoint(path, config, seed);
+}
+
+}  // namespace q3d::pipeline::network

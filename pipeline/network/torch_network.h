@@ -1,0 +1,26 @@
+// The network on LibTorch.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "pipeline/config/build_config.h"
+#include "pipeline/device/network.h"
+
+namespace q3d::pipeline::network {
+
+// Loads checkpoint and SMAL asset. Throws std::runtime_error (weights, asset, device) or ConfigError (device
+// name).
+std::unique_ptr<device::Network> load_network(const config::NetworkConfig& network,
+                                              const config::TtaConfig& tta);
+
+// What of device and threads decides the bits: "cpu-2", "cuda". Part of the stage keys; loads nothing.
+// Throws as load_network does.
+std::string device_key(const config::NetworkConfig& network);
+
+// A seeded checkpoint of a named size ("vith", "small", "tiny"). Throws ConfigError for another name.
+void write_initial_checkpoint(const std::filesystem::path& path, const std::string& size, std::uint64_t seed);
+
+}  // namespace q3d::pipeline::network

@@ -1,0 +1,53 @@
+#include "pipeline/run/interrupt.h"
+
+#include <unistd.h>
+
+#include <csignal>
+#include <cstring>
+
+#include "pipeline/run/errors.h"
+
+namespace q3d::pipeline::run {
+namespace {
+
+constexpr unsigned kGraceSeconds = 8;
+volatile std::sig_atomic_t signals_seen = 0;
+
+void leave_at_once(int) {
+  _exit(130);
+}
+
+// Async-signal-safe: write, alarm and _exit only.
+void on_signal(int) {
+  if (signals_seen != 0) _exit(130);
+  signals_seen = 1;
+  const char text[] =
+      "\ninterrupted: dropping the open unit (finished units stay; run the same command to go on)\n";
+  const ssize_t written = write(STDERR_FILENO, text, std::strlen(text));
+  static_cast<void>(written);
+  alarm(kGraceSeconds);
+}
+
+}  // namespace
+
+void install_interrupt_handlers() {
+  struct sigaction action {};
+  action.sa_handler = on_signal;
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+  struct sigaction last {};
+  last.sa_handler = leave_at_once;
+  sigaction(SIGALRM, &last, nullptr);
+  // A quota that is reached should fail the write, with a message, and not end the process.
+  std::signal(SIGXFSZ, SIG_IGN);
+}
+
+bool interrupted() {
+  return signals_seen != 0;
+}
+
+void throw_if_interrupted() {
+  if (interrupted()) throw Interrupted("interrupted");
+}
+
+}  // namespace q3d::pipeline::run

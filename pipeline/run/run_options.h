@@ -1,0 +1,14 @@
+// What every run over an output folder is told beside its configuration.
+#pragma once
+
+#include <filesystem>
+
+namespace q3d::pipeline::run {
+
+struct RunOptions {
+  std::filesystem::path out;
+  int threads = 0;     // of the flow graph; 0 = all cores. Never changes a byte of the result.
+  bool quiet = false;  // no progress on stderr
+};
+
+}  // namespace q3d::pipeline::run

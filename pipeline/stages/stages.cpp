@@ -1,0 +1,180 @@
+#include "pipeline/stages/stages.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "manifests/atomic_file.h"
+#include "manifests/shard.h"
+
+namespace q3d::pipeline::stages {
+namespace {
+
+using nlohmann::json;
+
+// Raise a number when a change of the code changes what the stage writes.
+constexpr int kIngestCode = 2;
+constexpr int kPredictCode = 2;
+constexpr int kFidelityCode = 1;
+constexpr int kRefineCode = 1;
+constexpr int kMeasureCode = 1;
+constexpr int kShardsCode = 1;
+
+std::string key_of(const char* stage, int code, json parts) {
+  parts["stage"] = stage;
+  parts["code"] = code;
+  return manifests::sha256(parts.dump());  // nlohmann sorts the keys, so the text is canonical
+}
+
+std::string ingest_key(const config::BuildConfig& config, const candidates::Ingest& ingest) {
+  json datasets = json::array();
+  for (const auto& dataset : config.datasets) {
+    const std::string name = dataset.name + "/" + dataset.split;
+    datasets.push_back(
+        {{"name", name}, {"format", dataset.format}, {"annotations", ingest.annotation_digests.at(name)}});
+  }
+  json units = json::array();
+  for (const candidates::Unit& unit : ingest.units) units.push_back(unit.label_digest);
+  return key_of("ingest", kIngestCode, {{"datasets", datasets}, {"units", units}});
+}
+
+bool are_equal(const filters::Thresholds& a, const filters::Thresholds& b) {
+  return a.tau_low == b.tau_low && a.tau_high == b.tau_high && a.delta == b.delta &&
+         a.gain_window == b.gain_window;
+}
+
+json thresholds_json(const filters::Thresholds& thresholds) {
+  return {{"tau_low", thresholds.tau_low},
+          {"tau_high", thresholds.tau_high},
+          {"delta", thresholds.delta},
+          {"gain_window", thresholds.gain_window}};
+}
+
+// Common thresholds count the same whether they were given for all datasets or for each of them.
+json fidelity_parts(const config::JudgingRules& rules) {
+  const filters::Thresholds& first = rules.thresholds.begin()->second;
+  const bool are_common = std::all_of(rules.thresholds.begin(), rules.thresholds.end(),
+                                      [&](const auto& each) { return are_equal(each.second, first); });
+  if (are_common) return thresholds_json(first);
+  json datasets = json::object();
+  for (const auto& [name, thresholds] : rules.thresholds) datasets[name] = thresholds_json(thresholds);
+  return {{"datasets", datasets}};
+}
+
+json refine_parts(const config::TtaConfig& tta, const config::GuardConfig& guards) {
+  json parts = {{"objective", tta.objective},
+                {"learning_rate", tta.learning_rate},
+                {"aux_weight", tta.aux_weight},
+                {"reproj_weight", tta.reproj_weight},
+                {"iterations_min", tta.iterations_min},
+                {"iterations_max", tta.iterations_max},
+                {"batch", tta.batch}};
+  if (guards.iterations_full_at > 0) parts["iterations_full_at"] = guards.iterations_full_at;
+  if (guards.held_out_share > 0.0) {
+    parts["held_out"] = {{"share", guards.held_out_share},
+                         {"seed", guards.held_out_seed},
+                         {"patience", guards.held_out_patience}};
+  }
+  return parts;
+}
+
+// What is measured, not what of it is let through.
+json measure_parts(const config::GuardConfig& guards, const AssetDigests& assets) {
+  json parts = {{"pose_deviation", guards.pose_deviation_max > 0.0},
+                {"limb_factor", guards.limb_factor_max > 0.0},
+                {"left_right", guards.left_right_max > 0.0},
+                {"mask_iou", guards.mask_iou_min > 0.0}};
+  if (!assets.priors.empty()) parts["priors"] = assets.priors;
+  return parts;
+}
+
+json bounds_json(const filters::GuardBounds& bounds) {
+  return {{"visible_min", bounds.visible_min},
+          {"pose_deviation_max", bounds.pose_deviation_max},
+          {"limb_factor_max", bounds.limb_factor_max},
+          {"left_right_max", bounds.left_right_max},
+          {"mask_iou_min", bounds.mask_iou_min}};
+}
+
+}  // namespace
+
+AssetDigests digest_assets(const config::BuildConfig& config, manifests::DigestCache& digests) {
+  if (!config::needs_network(config)) return {};
+  AssetDigests assets{
+      digests.digest(config.network.checkpoint), digests.digest(config.network.smal_asset), {}};
+  if (config::uses_priors(config.guards)) assets.priors = digests.digest(config::priors_file(config));
+  return assets;
+}
+
+std::string predict_key(const config::BuildConfig& config, const AssetDigests& assets,
+                        const std::string& device_key) {
+  if (!config::needs_network(config)) {
+    return key_of("predict", kPredictCode, {{"network", nullptr}, {"unit_size", config.shards.unit_size}});
+  }
+  return key_of("predict", kPredictCode,
+                {{"checkpoint", assets.checkpoint},
+                 {"smal_asset", assets.smal_asset},
+                 {"device", device_key},
+                 {"dtype", config.network.dtype},
+                 {"batch", config.network.batch},
+                 {"unit_size", config.shards.unit_size}});
+}
+
+StageKeys stage_keys(const config::BuildConfig& config, const config::JudgingRules& rules,
+                     const candidates::Ingest& ingest, const AssetDigests& assets,
+                     const std::string& device_key) {
+  StageKeys keys;
+  keys.ingest = ingest_key(config, ingest);
+  keys.predict = predict_key(config, assets, device_key);
+  const bool judges = config::needs_network(config);
+  json fidelity = judges ? fidelity_parts(rules) : json::object();
+  fidelity["predict"] = keys.predict;
+  keys.fidelity = key_of("fidelity", kFidelityCode, std::move(fidelity));
+  json refine = judges ? refine_parts(config.tta, config.guards) : json::object();
+  refine["fidelity"] = keys.fidelity;
+  keys.refine = key_of("refine", kRefineCode, std::move(refine));
+  json shards = {{"refine", keys.refine},
+                 {"schema", manifests::kShardSchema},
+                 {"name", config.name},
+                 {"images", config.shards.images},
+                 {"jpeg_quality", config.shards.jpeg_quality},
+                 {"crop_scale", config.shards.crop_scale},
+                 {"crop_min_side_px", config.shards.crop_min_side_px}};
+  if (judges && rules.measures_labels()) {
+    json measure = measure_parts(config.guards, assets);
+    measure["refine"] = keys.refine;
+    keys.measure = key_of("measure", kMeasureCode, std::move(measure));
+    shards["measure"] = keys.measure;
+    shards["bounds"] = bounds_json(config.guards);
+  }
+  keys.shards = key_of("shards", kShardsCode, std::move(shards));
+  keys.dataset =
+      key_of("dataset", 1, {{"ingest", keys.ingest}, {"shards", keys.shards}, {"version", config.version}});
+  return keys;
+}
+
+std::filesystem::path stage_folder(const std::filesystem::path& out, const std::string& stage,
+                                   const std::string& key) {
+  return out / "stages" / (stage + "-" + key.substr(0, kShortKey));
+}
+
+void open_stage_folder(const std::filesystem::path& folder, const std::string& stage,
+                       const std::string& key) {
+  std::filesystem::create_directories(folder);
+  manifests::remove_temporaries(folder);
+  const std::filesystem::path manifest = folder / "manifest.json";
+  if (std::filesystem::exists(manifest)) {
+    const json found = json::parse(manifests::read_file(manifest), nullptr, false);
+    if (found.is_object() && found.value("key", "") == key) return;
+    throw std::runtime_error(
+        fmt::format("{}: expected the {} stage with key {}, found {}; remove the folder to "
+                    "make it anew",
+                    manifest.string(), stage, key, found.is_object() ? found.dump() : "no JSON"));
+  }
+  manifests::write_file_atomically(manifest, json{{"stage", stage}, {"key", key}}.dump(2) + "\n");
+}
+
+}  // namespace q3d::pipeline::stages

@@ -1,0 +1,253 @@
+#include "pipeline/unit/unit_tables.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstring>
+#include <stdexcept>
+
+namespace q3d::pipeline::unit {
+namespace {
+
+using manifests::Table;
+
+// One array member of every row, end to end.
+template <typename Row, std::size_t N>
+void add_field(Table& table, const std::string& name, const std::vector<Row>& rows,
+               std::vector<std::int64_t> row_shape, std::array<float, N> device::BodyPrediction::*field) {
+  std::vector<float> values;
+  values.reserve(rows.size() * N);
+  for (const Row& row : rows) {
+    const auto& source = row.body.*field;
+    values.insert(values.end(), source.begin(), source.end());
+  }
+  table.add<float>(name, std::move(row_shape), values);
+}
+
+template <typename Row, std::size_t N>
+void read_field(const Table& table, const std::string& name, std::vector<Row>& rows,
+                std::array<float, N> device::BodyPrediction::*field) {
+  const std::span<const float> values = table.column<float>(name);
+  if (values.size() != rows.size() * N) {
+    throw std::runtime_error(fmt::format("column {} holds {} numbers, expected {} rows of {}", name,
+                                         values.size(), rows.size(), N));
+  }
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(i * N), N, (rows[i].body.*field).begin());
+  }
+}
+
+// The fields of a body, named once for writing and reading.
+template <typename Visitor>
+void visit_body(Visitor&& visit) {
+  visit("rotations", std::vector<std::int64_t>{manifests::kNumJoints, 3, 3},
+        &device::BodyPrediction::rotations);
+  visit("betas", std::vector<std::int64_t>{manifests::kNumBetas}, &device::BodyPrediction::betas);
+  visit("camera", std::vector<std::int64_t>{3}, &device::BodyPrediction::camera);
+  visit("translation", std::vector<std::int64_t>{3}, &device::BodyPrediction::translation);
+  visit("keypoints_3d", std::vector<std::int64_t>{manifests::kNumKeypoints, 3},
+        &device::BodyPrediction::keypoints_3d);
+  visit("keypoints_2d", std::vector<std::int64_t>{manifests::kNumKeypoints, 2},
+        &device::BodyPrediction::keypoints_2d);
+  visit("aux_keypoints_2d", std::vector<std::int64_t>{manifests::kNumKeypoints, 2},
+        &device::BodyPrediction::aux_keypoints_2d);
+}
+
+template <typename Row>
+void add_bodies(Table& table, const std::vector<Row>& rows) {
+  visit_body([&](const char* name, std::vector<std::int64_t> shape, auto field) {
+    add_field(table, name, rows, std::move(shape), field);
+  });
+}
+
+template <typename Row>
+void read_bodies(const Table& table, std::vector<Row>& rows) {
+  visit_body([&](const char* name, const std::vector<std::int64_t>&, auto field) {
+    read_field(table, name, rows, field);
+  });
+}
+
+// float64 numbers, as many a row as its curve has.
+void add_curves(Table& table, const std::string& name, const std::vector<RefinedSample>& samples,
+                std::vector<double> RefinedSample::*curve) {
+  auto& blobs = table.blobs[name];
+  for (const RefinedSample& sample : samples) {
+    const auto bytes = std::as_bytes(std::span(sample.*curve));
+    blobs.emplace_back(bytes.begin(), bytes.end());
+  }
+}
+
+// Leaves the curves empty where the table has no such column.
+void read_curves(const Table& table, const std::string& name, std::vector<RefinedSample>& samples,
+                 std::vector<double> RefinedSample::*curve) {
+  const auto blobs = table.blobs.find(name);
+  if (blobs == table.blobs.end()) return;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const auto& bytes = blobs->second[i];
+    auto& numbers = samples[i].*curve;
+    numbers.resize(bytes.size() / sizeof(double));
+    std::memcpy(numbers.data(), bytes.data(), numbers.size() * sizeof(double));
+  }
+}
+
+constexpr std::array<std::pair<const char*, double filters::LabelMeasures::*>, 4> kMeasureColumns{{
+    {"pose_deviation", &filters::LabelMeasures::pose_deviation},
+    {"limb_factor", &filters::LabelMeasures::limb_factor},
+    {"left_right", &filters::LabelMeasures::left_right},
+    {"mask_iou", &filters::LabelMeasures::mask_iou},
+}};
+
+const std::vector<std::string>& text_column(const Table& table, const std::string& name) {
+  const auto found = table.text.find(name);
+  if (found == table.text.end()) throw std::runtime_error("text column " + name + " is missing");
+  return found->second;
+}
+
+// Texts of the table are padded with NUL, so none may hold one; a hostile annotation file's may.
+std::string storable(std::string text) {
+  std::replace(text.begin(), text.end(), '\0', '?');
+  return text;
+}
+
+void add_candidates(Table& table, std::span<const candidates::Candidate> candidates) {
+  std::vector<double> boxes;
+  std::vector<double> positions;
+  std::vector<float> v;
+  std::vector<float> weights;
+  for (const candidates::Candidate& candidate : candidates) {
+    const manifests::SampleRecord& record = candidate.record;
+    table.text["id"].push_back(storable(record.id));
+    table.text["image_ref"].push_back(storable(record.image_ref));
+    boxes.insert(boxes.end(), {record.box.x_px, record.box.y_px, record.box.w_px, record.box.h_px});
+    for (const manifests::Keypoint& point : record.keypoints) {
+      positions.insert(positions.end(), {point.x_px, point.y_px});
+      v.push_back(point.v);
+      weights.push_back(point.weight);
+    }
+  }
+  table.add<double>("box_xywh_px", {4}, boxes);
+  table.add<double>("keypoints_px", {manifests::kNumKeypoints, 2}, positions);
+  table.add<float>("keypoint_v", {manifests::kNumKeypoints}, v);
+  table.add<float>("keypoint_weight", {manifests::kNumKeypoints}, weights);
+}
+
+}  // namespace
+
+Table to_table(std::span<const candidates::Candidate> candidates,
+               const std::vector<PredictedSample>& samples) {
+  Table table;
+  table.rows = static_cast<std::int64_t>(samples.size());
+  add_candidates(table, candidates);
+  std::vector<std::int32_t> image_size;
+  std::vector<std::uint8_t> has_mask;
+  for (const PredictedSample& sample : samples) {
+    image_size.insert(image_size.end(), {sample.image_width_px, sample.image_height_px});
+    has_mask.push_back(sample.has_mask ? 1 : 0);
+    table.text["failure"].emplace_back(manifests::to_string(sample.failure));
+    table.text["detail"].push_back(storable(sample.detail));
+  }
+  table.add<std::int32_t>("image_size_px", {2}, image_size);
+  table.add<std::uint8_t>("has_mask", {}, has_mask);
+  add_bodies(table, samples);
+  return table;
+}
+
+std::vector<PredictedSample> predicted_from_table(const Table& table) {
+  std::vector<PredictedSample> samples(static_cast<std::size_t>(table.rows));
+  if (samples.empty()) return samples;
+  const auto image_size = table.column<std::int32_t>("image_size_px");
+  const auto has_mask = table.column<std::uint8_t>("has_mask");
+  const auto& failure = text_column(table, "failure");
+  const auto& detail = text_column(table, "detail");
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    samples[i].failure = manifests::reason_from_string(failure[i]);
+    samples[i].detail = detail[i];
+    samples[i].image_width_px = image_size[2 * i];
+    samples[i].image_height_px = image_size[2 * i + 1];
+    samples[i].has_mask = has_mask[i] != 0;
+  }
+  read_bodies(table, samples);
+  return samples;
+}
+
+manifests::SampleRecord candidate_from_table(const Table& table, std::size_t row) {
+  manifests::SampleRecord record;
+  record.id = text_column(table, "id").at(row);
+  record.image_ref = text_column(table, "image_ref").at(row);
+  const auto box = table.column<double>("box_xywh_px").subspan(4 * row, 4);
+  record.box = {box[0], box[1], box[2], box[3]};
+  const auto positions = table.column<double>("keypoints_px");
+  const auto v = table.column<float>("keypoint_v");
+  const auto weights = table.column<float>("keypoint_weight");
+  for (std::size_t k = 0; k < record.keypoints.size(); ++k) {
+    const std::size_t at = row * record.keypoints.size() + k;
+    record.keypoints[k] = {positions[2 * at], positions[2 * at + 1], v[at], weights[at]};
+  }
+  return record;
+}
+
+Table to_table(const std::vector<RefinedSample>& samples) {
+  Table table;
+  table.rows = static_cast<std::int64_t>(samples.size());
+  std::vector<std::int64_t> positions;
+  for (const RefinedSample& sample : samples) positions.push_back(static_cast<std::int64_t>(sample.sample));
+  add_curves(table, "curve", samples, &RefinedSample::curve);
+  // The column is absent where nothing was held out.
+  const bool holds_out = std::any_of(samples.begin(), samples.end(), [](const RefinedSample& sample) {
+    return !sample.held_out_curve.empty();
+  });
+  if (holds_out) add_curves(table, "held_out_curve", samples, &RefinedSample::held_out_curve);
+  table.add<std::int64_t>("sample", {}, positions);
+  add_bodies(table, samples);
+  return table;
+}
+
+std::vector<RefinedSample> refined_from_table(const Table& table) {
+  std::vector<RefinedSample> samples(static_cast<std::size_t>(table.rows));
+  if (samples.empty()) return samples;
+  const auto positions = table.column<std::int64_t>("sample");
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    samples[i].sample = static_cast<std::size_t>(positions[i]);
+  }
+  if (table.blobs.count("curve") == 0) throw std::runtime_error("blob column curve is missing");
+  read_curves(table, "curve", samples, &RefinedSample::curve);
+  read_curves(table, "held_out_curve", samples, &RefinedSample::held_out_curve);
+  read_bodies(table, samples);
+  return samples;
+}
+
+Table to_table(const std::vector<MeasuredLabel>& labels) {
+  Table table;
+  table.rows = static_cast<std::int64_t>(labels.size());
+  std::vector<std::int64_t> positions;
+  std::vector<std::int32_t> visible;
+  for (const MeasuredLabel& label : labels) {
+    positions.push_back(static_cast<std::int64_t>(label.sample));
+    visible.push_back(label.measures.visible);
+  }
+  table.add<std::int64_t>("sample", {}, positions);
+  table.add<std::int32_t>("visible", {}, visible);
+  for (const auto& [name, field] : kMeasureColumns) {
+    std::vector<double> values;
+    for (const MeasuredLabel& label : labels) values.push_back(label.measures.*field);
+    table.add<double>(name, {}, values);
+  }
+  return table;
+}
+
+std::vector<MeasuredLabel> measured_from_table(const Table& table) {
+  std::vector<MeasuredLabel> labels(static_cast<std::size_t>(table.rows));
+  const auto positions = table.column<std::int64_t>("sample");
+  const auto visible = table.column<std::int32_t>("visible");
+  for (std::size_t i = 0; i < labels.size(); ++i) {
+    labels[i].sample = static_cast<std::size_t>(positions[i]);
+    labels[i].measures.visible = visible[i];
+  }
+  for (const auto& [name, field] : kMeasureColumns) {
+    const auto values = table.column<double>(name);
+    for (std::size_t i = 0; i < labels.size(); ++i) labels[i].measures.*field = values[i];
+  }
+  return labels;
+}
+
+}  // namespace q3d::pipeline::unit

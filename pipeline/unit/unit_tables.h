@@ -1,0 +1,25 @@
+// What predict, refine and measure put on disk for one unit, as tables.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "manifests/table.h"
+#include "pipeline/unit/unit_work.h"
+
+namespace q3d::pipeline::unit {
+
+// The predictions, and beside them what they are of: id, picture, box and keypoints.
+manifests::Table to_table(std::span<const candidates::Candidate> candidates,
+                          const std::vector<PredictedSample>& samples);
+manifests::Table to_table(const std::vector<RefinedSample>& samples);
+manifests::Table to_table(const std::vector<MeasuredLabel>& labels);
+
+// Throw std::runtime_error when a column is missing or has another type.
+std::vector<PredictedSample> predicted_from_table(const manifests::Table& table);
+// One candidate's id, image_ref, box and keypoints; the rest of the record is not there.
+manifests::SampleRecord candidate_from_table(const manifests::Table& table, std::size_t row);
+std::vector<RefinedSample> refined_from_table(const manifests::Table& table);
+std::vector<MeasuredLabel> measured_from_table(const manifests::Table& table);
+
+}  // namespace q3d::pipeline::unit

@@ -1,0 +1,28 @@
+#include "smal/axis_angle.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+
+namespace q3d::smal {
+namespace {
+
+Eigen::Matrix3d rotation_matrix(const Eigen::Vector3d& axis_angle) {
+  const double angle_rad = axis_angle.norm();
+  if (angle_rad == 0.0) return Eigen::Matrix3d::Identity();
+  return Eigen::AngleAxisd(angle_rad, axis_angle / angle_rad).toRotationMatrix();
+}
+
+}  // namespace
+
+std::array<float, kNumJoints * 9> rotation_matrices(const std::array<float, kNumJoints * 3>& axis_angle) {
+  std::array<float, kNumJoints * 9> matrices{};
+  for (std::size_t joint = 0; joint < kNumJoints; ++joint) {
+    const float* turn = &axis_angle[3 * joint];
+    const Eigen::Matrix<float, 3, 3, Eigen::RowMajor> matrix =
+        rotation_matrix({turn[0], turn[1], turn[2]}).cast<float>();
+    std::copy_n(matrix.data(), 9, &matrices[9 * joint]);
+  }
+  return matrices;
+}
+
+}  // namespace q3d::smal

@@ -1,0 +1,42 @@
+// safetensors files: memory-mapped reading and atomic writing.
+#pragma once
+
+#include <torch/torch.h>
+
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace q3d::smal::tensors {
+
+// A read-only mapping. Tensors share the mapped pages and keep the mapping alive.
+class SafeTensors {
+ public:
+  // Throws std::runtime_error naming path, entry, got and expected: not a safetensors file, truncated,
+  // offsets that overlap, leave holes or point outside, unknown dtype, shape that disagrees with the byte
+  // count.
+  static SafeTensors open(const std::filesystem::path& path);
+
+  const std::filesystem::path& path() const;
+  const std::map<std::string, std::string>& metadata() const;
+  std::vector<std::string> names() const;  // sorted
+  bool contains(const std::string& name) const;
+  // CPU tensor over the mapping: do not write to it. Throws std::runtime_error when the name is absent.
+  torch::Tensor tensor(const std::string& name) const;
+
+ private:
+  struct Mapping;
+  std::shared_ptr<const Mapping> mapping_;
+};
+
+using NamedTensors = std::vector<std::pair<std::string, torch::Tensor>>;
+
+// Writes under a temporary name, fsyncs and renames. Tensors are written contiguous, in the given order.
+// Throws std::runtime_error naming the path and the system's reason.
+void write_safetensors(const std::filesystem::path& path, const NamedTensors& tensors,
+                       const std::map<std::string, std::string>& metadata = {});
+
+}  // namespace q3d::smal::tensors

@@ -1,0 +1,21 @@
+// Shape and dtype checks at the doors of the public functions of smal/.
+#pragma once
+
+#include <torch/torch.h>
+
+#include <vector>
+
+namespace q3d::smal::tensors {
+
+inline constexpr std::int64_t kAnySize = -1;
+
+// Throws std::invalid_argument "where: name is (got) dtype, expected (...) floating point" unless `tensor` is
+// a floating-point tensor of the given sizes, of which kAnySize matches every size.
+void expect_floating(const torch::Tensor& tensor, const char* where, const char* name,
+                     const std::vector<std::int64_t>& sizes);
+
+// The same for the last sizes only: any number of leading ones may come before `trailing`.
+void expect_trailing(const torch::Tensor& tensor, const char* where, const char* name,
+                     const std::vector<std::int64_t>& trailing);
+
+}  // namespace q3d::smal::tensors

@@ -1,0 +1,56 @@
+#include "loaders/formats/own_process.h"
+
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <stdexcept>
+
+namespace q3d::loaders::formats {
+namespace {
+
+using std::chrono::seconds;
+using testing::HasSubstr;
+
+std::string refusal_of(const std::function<std::string()>& work, seconds limit = seconds(60)) {
+  try {
+    in_own_process(work, limit);
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "nothing was thrown";
+}
+
+TEST(OwnProcess, GivesWhatTheWorkReturnsHoweverLong) {
+  EXPECT_EQ(in_own_process([] { return std::string(); }, seconds(60)), "");
+  const std::string bytes = std::string(std::size_t{3} << 20U, 'x') + '\0' + "end";
+  EXPECT_EQ(in_own_process([&bytes] { return bytes; }, seconds(60)), bytes);
+}
+
+TEST(OwnProcess, IsAnotherOne) {
+  const std::string own = std::to_string(getpid());
+  EXPECT_NE(in_own_process([] { return std::to_string(getpid()); }, seconds(60)), own);
+}
+
+TEST(OwnProcess, PassesOnWhatTheWorkThrows) {
+  EXPECT_EQ(refusal_of([]() -> std::string { throw std::runtime_error("column 3: got 4, expected 5"); }),
+            "column 3: got 4, expected 5");
+}
+
+TEST(OwnProcess, OutlivesACrash) {
+  for (const int signal : {SIGSEGV, SIGABRT, SIGKILL}) {
+    EXPECT_THAT(refusal_of([signal] { return raise(signal), std::string("alive"); }), HasSubstr("crashed"));
+  }
+}
+
+TEST(OwnProcess, OutlivesAnExit) {
+  EXPECT_THAT(refusal_of([]() -> std::string { _exit(3); }), HasSubstr("status 3"));
+}
+
+TEST(OwnProcess, EndsWorkThatHangs) {
+  EXPECT_THAT(refusal_of([]() -> std::string { return pause(), std::string("awake"); }, seconds(1)),
+              HasSubstr("after 1 s"));
+}
+
+}  // namespace
+}  // namespace q3d::loaders::formats

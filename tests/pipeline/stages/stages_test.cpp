@@ -1,0 +1,192 @@
+#include "pipeline/stages/stages.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <functional>
+#include <vector>
+
+#include "tests/support/paths.h"
+
+namespace q3d::pipeline::stages {
+namespace {
+
+struct Inputs {
+  config::BuildConfig config;
+  config::JudgingRules rules;
+  candidates::Ingest ingest;
+  AssetDigests assets{"checkpoint", "asset", ""};
+  std::string device = "cpu-2";
+
+  Inputs() {
+    config::DatasetConfig& dataset = config.datasets.emplace_back();
+    dataset.name = "a";
+    dataset.format = "prima";
+    dataset.split = "train";
+    dataset.root = "r";
+    dataset.annotations = "t";
+    ingest.annotation_digests["a/train"] = "digest";
+    ingest.units.push_back({0, 0, 1, "unit", "unit"});
+    limits().tau_low = 0.1;
+    limits().tau_high = 0.2;
+  }
+  filters::Thresholds& limits() { return rules.thresholds["a"]; }
+  // The guards of the rules are those of the config.
+  void guard(const std::function<void(config::GuardConfig&)>& change) {
+    change(config.guards);
+    rules.guards = config.guards;
+  }
+  StageKeys keys() const { return stage_keys(config, rules, ingest, assets, device); }
+};
+
+TEST(StageKeys, AChangedTauKeepsPredictionsAndRedoesTheRest) {
+  Inputs inputs;
+  const StageKeys before = inputs.keys();
+  inputs.limits().tau_low = 0.11;
+  const StageKeys after = inputs.keys();
+  EXPECT_EQ(before.ingest, after.ingest);
+  EXPECT_EQ(before.predict, after.predict);
+  EXPECT_NE(before.fidelity, after.fidelity);
+  EXPECT_NE(before.refine, after.refine);
+  EXPECT_NE(before.shards, after.shards);
+  EXPECT_NE(before.dataset, after.dataset);
+}
+
+TEST(StageKeys, AddedPhotosMakeANewVersionFromTheSameUnits) {
+  Inputs inputs;
+  const StageKeys before = inputs.keys();
+  inputs.ingest.units.push_back({1, 1, 1, "more", "more"});
+  const StageKeys after = inputs.keys();
+  EXPECT_NE(before.ingest, after.ingest);
+  EXPECT_EQ(before.predict, after.predict);
+  EXPECT_EQ(before.shards, after.shards);
+  EXPECT_NE(before.dataset, after.dataset);
+}
+
+TEST(StageKeys, ALeftOutSampleMakesANewVersionFromTheSamePredictions) {
+  Inputs inputs;
+  const StageKeys before = inputs.keys();
+  inputs.ingest.units[0].label_digest = "without one";
+  const StageKeys after = inputs.keys();
+  EXPECT_EQ(before.predict, after.predict);
+  EXPECT_EQ(before.refine, after.refine);
+  EXPECT_NE(before.dataset, after.dataset);
+}
+
+TEST(StageKeys, WhatDecidesPredictionsIsInTheirKey) {
+  const Inputs inputs;
+  const std::string before = inputs.keys().predict;
+  const auto changed = [&](auto&& change) {
+    Inputs other;
+    change(other);
+    return other.keys().predict;
+  };
+  EXPECT_NE(before, changed([](Inputs& i) { i.assets.checkpoint = "x"; }));
+  EXPECT_NE(before, changed([](Inputs& i) { i.assets.smal_asset = "x"; }));
+  EXPECT_NE(before, changed([](Inputs& i) { i.device = "cpu-1"; }));
+  EXPECT_NE(before, changed([](Inputs& i) { i.config.network.batch = 3; }));
+  EXPECT_NE(before, changed([](Inputs& i) { i.config.network.dtype = "bfloat16"; }));
+  EXPECT_NE(before, changed([](Inputs& i) { i.config.shards.unit_size = 3; }));
+  EXPECT_EQ(before, changed([](Inputs& i) { i.config.tta.learning_rate = 3; }));
+  EXPECT_EQ(before, changed([](Inputs& i) { i.config.datasets[0].root = "elsewhere"; }));
+}
+
+TEST(StageKeys, WhatDecidesRefinementsAndShardsIsInTheirKeys) {
+  const Inputs inputs;
+  const StageKeys before = inputs.keys();
+  Inputs rate;
+  rate.config.tta.learning_rate = 1e-3;
+  EXPECT_EQ(before.fidelity, rate.keys().fidelity);
+  EXPECT_NE(before.refine, rate.keys().refine);
+  Inputs quality;
+  quality.config.shards.jpeg_quality = 50;
+  EXPECT_EQ(before.refine, quality.keys().refine);
+  EXPECT_NE(before.shards, quality.keys().shards);
+}
+
+TEST(StageKeys, WithoutPseudoLabelsNothingOfTheNetworkIsInThem) {
+  Inputs inputs;
+  inputs.config.datasets[0].role = config::Role::truth;
+  const StageKeys before = inputs.keys();
+  EXPECT_NE(before.predict, Inputs().keys().predict);
+  Inputs other = inputs;
+  other.config.network.batch = 3;
+  other.config.tta.learning_rate = 3;
+  other.limits().tau_low = 0.15;
+  EXPECT_EQ(before.shards, other.keys().shards);
+  EXPECT_EQ(before.dataset, other.keys().dataset);
+  other.config.shards.jpeg_quality = 50;
+  EXPECT_NE(before.shards, other.keys().shards);
+}
+
+TEST(StageKeys, AGuardThatChangesAdaptationRedoesRefinement) {
+  const StageKeys before = Inputs().keys();
+  for (const auto& change : std::vector<std::function<void(config::GuardConfig&)>>{
+           [](config::GuardConfig& g) { g.iterations_full_at = 12; },
+           [](config::GuardConfig& g) { g.held_out_share = 0.2; }}) {
+    Inputs inputs;
+    inputs.guard(change);
+    const StageKeys after = inputs.keys();
+    EXPECT_EQ(before.predict, after.predict);
+    EXPECT_EQ(before.fidelity, after.fidelity);
+    EXPECT_NE(before.refine, after.refine);
+    EXPECT_NE(before.shards, after.shards);
+    EXPECT_EQ(after.measure, "");
+  }
+  Inputs seed;  // of nothing
+  seed.guard([](config::GuardConfig& g) { g.held_out_seed = 5; });
+  EXPECT_EQ(before.refine, seed.keys().refine);
+}
+
+TEST(StageKeys, AChangedBoundKeepsRefinementsAndMeasures) {
+  const StageKeys none = Inputs().keys();
+  EXPECT_EQ(none.measure, "");
+  Inputs inputs;
+  inputs.guard([](config::GuardConfig& g) { g.mask_iou_min = 0.5; });
+  const StageKeys before = inputs.keys();
+  EXPECT_EQ(none.refine, before.refine);
+  EXPECT_NE(before.measure, "");
+  EXPECT_NE(none.shards, before.shards);
+  inputs.guard([](config::GuardConfig& g) { g.mask_iou_min = 0.6; });
+  const StageKeys after = inputs.keys();
+  EXPECT_EQ(before.predict, after.predict);
+  EXPECT_EQ(before.refine, after.refine);
+  EXPECT_EQ(before.measure, after.measure);
+  EXPECT_NE(before.shards, after.shards);
+  inputs.guard([](config::GuardConfig& g) { g.limb_factor_max = 2.0; });
+  EXPECT_NE(after.measure, inputs.keys().measure) << "more is measured";
+  const StageKeys by_one = inputs.keys();
+  inputs.assets.priors = "other priors";
+  EXPECT_NE(by_one.measure, inputs.keys().measure);
+  EXPECT_EQ(by_one.refine, inputs.keys().refine);
+}
+
+TEST(StageKeys, ThresholdsOfADatasetCount) {
+  Inputs common;
+  common.rules.thresholds["b"] = common.limits();
+  EXPECT_EQ(Inputs().keys().fidelity, common.keys().fidelity) << "the same for all";
+  Inputs own = common;
+  own.rules.thresholds["b"].tau_low = 0.12;
+  EXPECT_NE(common.keys().fidelity, own.keys().fidelity);
+  EXPECT_EQ(common.keys().predict, own.keys().predict);
+}
+
+TEST(StageFolder, RefusesAFolderOfAnotherKey) {
+  const testing::ScratchDir scratch;
+  const auto folder = stage_folder(scratch.path(), "predict", std::string(64, 'a'));
+  open_stage_folder(folder, "predict", std::string(64, 'a'));
+  open_stage_folder(folder, "predict", std::string(64, 'a'));
+  EXPECT_THROW(open_stage_folder(folder, "predict", std::string(64, 'b')), std::runtime_error);
+}
+
+TEST(StageFolder, RemovesTornTemporaries) {
+  const testing::ScratchDir scratch;
+  const auto folder = stage_folder(scratch.path(), "predict", std::string(64, 'a'));
+  open_stage_folder(folder, "predict", std::string(64, 'a'));
+  std::ofstream(folder / "unit-000000.h5.tmp") << "half";
+  open_stage_folder(folder, "predict", std::string(64, 'a'));
+  EXPECT_FALSE(std::filesystem::exists(folder / "unit-000000.h5.tmp"));
+}
+
+}  // namespace
+}  // namespace q3d::pipeline::stages

@@ -1,0 +1,136 @@
+#include "pipeline/unit/unit_tables.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/support/paths.h"
+
+namespace q3d::pipeline::unit {
+namespace {
+
+// Distinct numbers in every field, so that a swapped or shifted column shows.
+device::BodyPrediction numbered(float first) {
+  device::BodyPrediction body;
+  float value = first;
+  const auto fill = [&](auto& field) {
+    for (float& element : field) element = value += 0.25F;
+  };
+  fill(body.rotations);
+  fill(body.betas);
+  fill(body.camera);
+  fill(body.translation);
+  fill(body.keypoints_3d);
+  fill(body.keypoints_2d);
+  fill(body.aux_keypoints_2d);
+  return body;
+}
+
+void expect_equal(const device::BodyPrediction& a, const device::BodyPrediction& b) {
+  EXPECT_EQ(a.rotations, b.rotations);
+  EXPECT_EQ(a.betas, b.betas);
+  EXPECT_EQ(a.camera, b.camera);
+  EXPECT_EQ(a.translation, b.translation);
+  EXPECT_EQ(a.keypoints_3d, b.keypoints_3d);
+  EXPECT_EQ(a.keypoints_2d, b.keypoints_2d);
+  EXPECT_EQ(a.aux_keypoints_2d, b.aux_keypoints_2d);
+}
+
+TEST(UnitTables, PredictionsSurviveTheDisk) {
+  const testing::ScratchDir scratch;
+  std::vector<PredictedSample> samples(3);
+  samples[0] = {manifests::Reason::none, "", 640, 480, true, numbered(0)};
+  samples[1] = {manifests::Reason::image_truncated, "ends at byte 17", 0, 0, false, {}};
+  samples[2] = {manifests::Reason::none, "", 1, 2, false, numbered(1000)};
+  std::vector<candidates::Candidate> candidates(3);
+  candidates[2].record.id = "set/train/a.png#2";
+  candidates[2].record.image_ref = "a.png";
+  candidates[2].record.box = {1.5, 2.5, 3.5, 4.5};
+  candidates[2].record.keypoints[25] = {7.25, 8.25, 2.0F, 0.5F};
+  manifests::write_table(scratch.path() / "t.h5", to_table(candidates, samples));
+  const manifests::Table table = manifests::read_table(scratch.path() / "t.h5");
+  const manifests::SampleRecord asked = candidate_from_table(table, 2);
+  EXPECT_EQ(asked.id, "set/train/a.png#2");
+  EXPECT_EQ(asked.image_ref, "a.png");
+  EXPECT_EQ(asked.box.w_px, 3.5);
+  EXPECT_EQ(asked.keypoints[25].y_px, 8.25);
+  EXPECT_EQ(asked.keypoints[25].v, 2.0F);
+  EXPECT_EQ(asked.keypoints[25].weight, 0.5F);
+  EXPECT_EQ(asked.keypoints[24].weight, 0.0F);
+  const auto back = predicted_from_table(table);
+  ASSERT_EQ(back.size(), samples.size());
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    EXPECT_EQ(back[i].failure, samples[i].failure);
+    EXPECT_EQ(back[i].detail, samples[i].detail);
+    EXPECT_EQ(back[i].image_width_px, samples[i].image_width_px);
+    EXPECT_EQ(back[i].image_height_px, samples[i].image_height_px);
+    EXPECT_EQ(back[i].has_mask, samples[i].has_mask);
+    expect_equal(back[i].body, samples[i].body);
+  }
+}
+
+TEST(UnitTables, RefinementsSurviveTheDiskWithCurvesOfDifferentLengths) {
+  const testing::ScratchDir scratch;
+  std::vector<RefinedSample> samples = {
+      {4, {0.5, 0.25, 0.125}, numbered(3), {0.6, 0.7, 0.8}}, {9, {0.7}, numbered(7), {}}, {11, {}, {}, {}}};
+  manifests::write_table(scratch.path() / "t.h5", to_table(samples));
+  const auto back = refined_from_table(manifests::read_table(scratch.path() / "t.h5"));
+  ASSERT_EQ(back.size(), samples.size());
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    EXPECT_EQ(back[i].sample, samples[i].sample);
+    EXPECT_EQ(back[i].curve, samples[i].curve);
+    EXPECT_EQ(back[i].held_out_curve, samples[i].held_out_curve);
+    expect_equal(back[i].body, samples[i].body);
+  }
+}
+
+TEST(UnitTables, WithoutHeldOutKeypointsThereIsNoColumnOfThem) {
+  const std::vector<RefinedSample> samples{{4, {0.5, 0.25}, numbered(3), {}}};
+  const manifests::Table table = to_table(samples);
+  EXPECT_EQ(table.blobs.count("held_out_curve"), 0U);
+  EXPECT_TRUE(refined_from_table(table)[0].held_out_curve.empty());
+}
+
+TEST(UnitTables, MeasuresSurviveTheDisk) {
+  const testing::ScratchDir scratch;
+  std::vector<MeasuredLabel> labels(2);
+  labels[0].sample = 3;
+  labels[0].measures = {17, 1.25, 0.75, 0.5, 0.875};
+  labels[1].sample = 8;
+  labels[1].measures.visible = 5;  // nothing else could be measured
+  manifests::write_table(scratch.path() / "t.h5", to_table(labels));
+  const auto back = measured_from_table(manifests::read_table(scratch.path() / "t.h5"));
+  ASSERT_EQ(back.size(), 2U);
+  EXPECT_EQ(back[0].sample, 3U);
+  EXPECT_EQ(back[0].measures.visible, 17);
+  EXPECT_EQ(back[0].measures.pose_deviation, 1.25);
+  EXPECT_EQ(back[0].measures.limb_factor, 0.75);
+  EXPECT_EQ(back[0].measures.left_right, 0.5);
+  EXPECT_EQ(back[0].measures.mask_iou, 0.875);
+  EXPECT_EQ(back[1].sample, 8U);
+  EXPECT_EQ(back[1].measures.visible, 5);
+  EXPECT_TRUE(std::isnan(back[1].measures.pose_deviation));
+  EXPECT_TRUE(std::isnan(back[1].measures.mask_iou));
+  manifests::write_table(scratch.path() / "empty.h5", to_table(std::vector<MeasuredLabel>()));
+  EXPECT_TRUE(measured_from_table(manifests::read_table(scratch.path() / "empty.h5")).empty());
+}
+
+TEST(UnitTables, AnEmptyUnitIsATable) {
+  const testing::ScratchDir scratch;
+  manifests::write_table(scratch.path() / "t.h5", to_table(std::vector<RefinedSample>()));
+  EXPECT_TRUE(refined_from_table(manifests::read_table(scratch.path() / "t.h5")).empty());
+}
+
+TEST(UnitTables, AMissingColumnIsNamed) {
+  manifests::Table table = to_table(std::vector<candidates::Candidate>(1), std::vector<PredictedSample>(1));
+  table.numeric.erase("betas");
+  try {
+    predicted_from_table(table);
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_NE(std::string(error.what()).find("betas"), std::string::npos) << error.what();
+  }
+}
+
+}  // namespace
+}  // namespace q3d::pipeline::unit
