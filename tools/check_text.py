@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Finds small faults in text files: trailing spaces, tabs in sources, Windows line ends, no line end at the end of the
-file, leftovers of a merge, JSON that cannot be read, and files above 1 MB.
+file, leftovers of a merge, JSON that cannot be read, links in pages that lead nowhere, and files above 1 MB.
 
     tools/check_text.py            every tracked file
     tools/check_text.py FILE...    these files
@@ -18,6 +18,7 @@ import sys
 
 LARGEST_BYTES = 1_000_000
 NO_TABS = (".cpp", ".h", ".py", ".json", ".yaml", ".yml", ".cmake", "CMakeLists.txt")
+LINK = re.compile(r"\]\(([^)#\s]+)")  # [text](target), without the target's #part
 MERGE = re.compile(r"^(<{7}|>{7})( |$)")
 
 # The golden numbers and the shipped network are large; the rest of this list is data, or a text that others wrote.
@@ -36,6 +37,16 @@ def faults_of_line(name: str, line: str) -> list[str]:
     if MERGE.match(line):
         faults.append("a leftover of a merge")
     return faults
+
+
+def dead_links(name: str, text: str) -> list[str]:
+    """Links of a Markdown page to files that are not in the repository. Addresses on the web are not tried."""
+    code = re.compile(r"```.*?```|`[^`\n]*`", re.DOTALL)
+    targets = LINK.findall(code.sub("", text))
+    here = os.path.dirname(name)
+    local = [target for target in targets if not re.match(r"[a-z]+:", target)]
+    return [f"{name}: the link to {target} leads nowhere" for target in local
+            if not os.path.exists(os.path.join(here, target))]
 
 
 def faults(name: str) -> list[str]:
@@ -59,6 +70,8 @@ def faults(name: str) -> list[str]:
     found = [f"{name}:{i}: {fault}" for i, line in enumerate(lines, 1) for fault in faults_of_line(name, line)]
     if text and not text.endswith("\n"):
         found.append(f"{name}:{len(lines)}: no line end at the end of the file")
+    if name.endswith(".md"):
+        found += dead_links(name, text)
     if name.endswith(".json") and "//" not in text:  # configs may have comments, which Python does not read
         try:
             json.loads(text)
