@@ -6,7 +6,9 @@
 #   tools/tidy.sh --all        every source
 #   tools/tidy.sh FILE...      these sources
 # A changed header is checked through a source that includes it. A file that was only moved does not count as changed.
-# Every finding is printed once. Exit codes: 0 none, 1 findings, 2 something is missing.
+# Every finding is printed once. A source that was clean before, with the same headers, flags and checks, is not checked
+# again, in whatever clone of this repository (an empty file for each in ~/.cache/quadruped3d-tidy).
+# Exit codes: 0 no finding, 1 findings, 2 something is missing.
 # BUILD (build/release) is a configured build folder, JOBS (all cores) how many files are checked at a time.
 set -euo pipefail
 exec python3 "$(dirname "$0")/tidy.py" "$@"
