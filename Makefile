@@ -9,7 +9,7 @@ SEED     ?= 0
 FUZZ_SECONDS ?= 60
 FUZZ_TARGETS ?=
 
-.PHONY: quadruped3d sample-model sample-loop test program build setup assets format bench asan fuzz clean help
+.PHONY: quadruped3d sample-model sample-loop test program build setup assets format tidy bench asan fuzz clean help
 
 quadruped3d: program  ## build the dataset that CONFIG describes (default: the rendered sample world)
 	tools/quadruped3d.sh $(OUT) $(CONFIG)
@@ -55,6 +55,9 @@ fuzz: setup  ## fuzz every reader of files for FUZZ_SECONDS each (clang; tests/f
 
 format:  ## format every source in place
 	git ls-files '*.h' '*.cpp' | xargs clang-format -i
+
+tidy: $(BUILD)/build.ninja  ## clang-tidy on the C++ files that differ from origin/main (tools/tidy.sh says what else it can)
+	@BUILD=$(BUILD) JOBS=$(JOBS) tools/tidy.sh
 
 clean:  ## remove what was compiled
 	rm -rf build
