@@ -145,7 +145,7 @@ BootstrapInterval bootstrap_of_sets(std::span<const double> first, std::span<con
   check(second, picture_of_item, options);
   if (first.size() != second.size()) {
     refuse("got " + std::to_string(first.size()) + " values of the first set and " +
-           std::to_string(second.size()) + " of the second, expected as many of each");
+           std::to_string(second.size()) + " of the second, expected equal numbers");
   }
   const PictureSums of_first(first, picture_of_item);
   const PictureSums of_second(second, picture_of_item);

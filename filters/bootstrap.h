@@ -1,5 +1,5 @@
-// Paired bootstrap: is one method better than another on the same pictures? Efron and Tibshirani, An
-// Introduction to the Bootstrap (1993), chapters 8 and 13 (percentile intervals).
+// Paired bootstrap, which tests whether one method is better than another on the same pictures. Efron and
+// Tibshirani, An Introduction to the Bootstrap (1993), chapters 8 and 13 (percentile intervals).
 #pragma once
 
 #include <cstdint>
@@ -15,35 +15,36 @@ struct BootstrapOptions {
 };
 
 struct BootstrapInterval {
-  double mean = 0.0;  // of all differences
+  double mean = 0.0;  // mean of all differences
   double low = 0.0;   // the interval's ends
   double high = 0.0;
 };
 
-// differences: runs x items, row-major: second minus first method, of one item under one pair of runs (a pair
-// of seeds). picture_of_item: items numbers from 0, without gaps; items of one picture are drawn together,
-// since they are not independent.
+// differences: runs x items, row-major. Each is the second minus the first method's value, for one item under
+// one pair of runs (a pair of seeds). picture_of_item: the picture of each item; pictures are numbered from 0
+// without gaps. Items of one picture are drawn together, because they are not independent.
 //
 // Each resample draws as many pictures as there are, with replacement, and as many runs, and takes the mean
-// difference of the items so drawn; the interval's ends are quantiles of these means, linearly interpolated.
-// With one run, only pictures are drawn. The same seed gives the same interval on every machine.
+// difference of the drawn items. The ends of the interval are quantiles of these means, linearly
+// interpolated. With one run, only pictures are drawn. The same seed gives the same interval on every
+// machine.
 //
-// Throws std::invalid_argument for sizes that do not fit, no items, a number that is not finite, or options
+// Throws std::invalid_argument for sizes that do not match, no items, a number that is not finite, or options
 // out of range.
 BootstrapInterval paired_bootstrap(std::span<const double> differences,
                                    std::span<const std::size_t> picture_of_item,
                                    const BootstrapOptions& options);
 
-// The same for two methods that choose their items, such as labels that two builds keep: the mean of the
-// second set minus that of the first. first, second: runs x items, row-major, the item's value under either
-// method; NaN where it is not in the set.
+// The same for two methods that choose their items, such as the labels that two builds keep. The result is
+// the mean of the second set minus that of the first. first, second: runs x items, row-major; the item's
+// value under each method, NaN if it is not in the set.
 //
-// Pictures and runs are drawn as above, the same for both sets; a resample's difference is that of the two
-// means over all drawn members, so the interval knows that a picture that is easy for one method is easy for
-// the other. It takes the sets as given: what chose them is not repeated. A resample that misses one of the
-// sets altogether is drawn again.
+// Pictures and runs are drawn as above, the same for both sets. A resample's difference is that of the two
+// means over all drawn members, so a picture that is easy for both methods does not widen the interval. The
+// sets are taken as given; the choice that made them is not repeated. A resample without any member of one of
+// the sets is drawn again.
 //
-// Throws std::invalid_argument as paired_bootstrap does, for infinite values, and when a set is empty.
+// Throws std::invalid_argument as paired_bootstrap does, for infinite values, and if a set is empty.
 BootstrapInterval bootstrap_of_sets(std::span<const double> first, std::span<const double> second,
                                     std::span<const std::size_t> picture_of_item,
                                     const BootstrapOptions& options);

@@ -16,7 +16,7 @@ void check_input(std::span<const CalibrationSample> pool, const TargetShares& sh
     if (!std::isfinite(sample.initial_error) || sample.initial_error < 0) {
       throw std::invalid_argument("calibrate: got an initial error of " +
                                   std::to_string(sample.initial_error) +
-                                  ", expected finite numbers from 0 on");
+                                  ", expected finite numbers of 0 or more");
     }
   }
   if (!(shares.retained > 0 && shares.refined > 0 && shares.retained + shares.refined < 1)) {

@@ -15,36 +15,39 @@ struct Thresholds {
   int iterations_min = 10;
   int iterations_max = 60;
 };
-// Throws std::invalid_argument naming the threshold unless 0 < tau_low <= tau_high, 0 <= delta < 1,
+// Throws std::invalid_argument that names the threshold unless 0 < tau_low <= tau_high, 0 <= delta < 1,
 // gain_window >= 1 and 1 <= iterations_min <= iterations_max.
 void check(const Thresholds& thresholds);
 
 enum class Band { retain, refine, discard };
 
-// By the initial L_proj: below tau_low, the middle band [tau_low, tau_high), tau_high and above (NaN too).
+// Returns the band of an initial L_proj: retain below tau_low, refine in the middle band [tau_low, tau_high),
+// discard from tau_high on and for NaN.
 Band band(double initial_error, const Thresholds& thresholds);
 
-// round(min + (max - min) (L0 - tau_low) / (tau_high - tau_low)), halves up. Throws std::invalid_argument for
-// a sample outside the middle band.
+// Returns the number of adaptation iterations, round(min + (max - min) (L0 - tau_low) / (tau_high -
+// tau_low)), with halves rounded up. Throws std::invalid_argument for a sample outside the middle band.
 int adaptation_iterations(double initial_error, const Thresholds& thresholds);
 
-// Verdict without adaptation: retained below tau_low, else discarded (error_too_large from tau_high on; a
-// sample of the middle band has shown no gain, so gain_too_small until judge_adapted has seen its curve). A
-// non-finite error is a failure (prediction_not_finite).
+// Returns the verdict without adaptation. Below tau_low a sample is retained. From tau_high on it is
+// discarded as error_too_large. In the middle band it is discarded as gain_too_small, because it has shown no
+// gain until judge_adapted has seen its curve. An error that is not finite is a failure
+// (prediction_not_finite).
 manifests::Judgement judge_initial(double initial_error, const Thresholds& thresholds);
 
-// Verdict after adaptation, from L_proj of iterates 0..n of a sample that the caller sent to adaptation. A
-// curve that falls below tau_low has passed; else the relative gain (L0 - min over iterates 1..gain_window) /
-// L0 must reach delta. The kept iterate is the first of least L_proj, iterate 0 included. Iterates that are
-// not finite are passed over; a curve that is empty or starts with one is a failure (prediction_not_finite).
+// Returns the verdict after adaptation. `curve` is L_proj of the iterates 0..n of a sample that was sent to
+// adaptation. A curve that falls below tau_low passes. Otherwise the relative gain (L0 - min over iterates
+// 1..gain_window) / L0 must reach delta. The kept iterate is the first with the least L_proj, iterate 0
+// included. Iterates that are not finite are skipped. A curve that is empty or starts with such an iterate is
+// a failure (prediction_not_finite).
 manifests::Judgement judge_adapted(std::span<const double> curve, const Thresholds& thresholds);
 
-// The same of a sample that adaptation did not see whole: `held_out` is the error of the keypoints that were
-// kept from it, of the same iterates as `curve`, which is of all visible keypoints. The kept iterate is the
-// first of least held-out error. It is asked for more than the paper's rule: the iterate that is to be below
-// tau_low is the kept one, and it must not be the prediction itself (held_out_not_better), since what does
-// not help the points it has not seen is no better body. Throws std::invalid_argument when the lengths
-// differ.
+// The same for a sample of which adaptation did not see all keypoints. `held_out` is the error of the hidden
+// keypoints; `curve` is the error of all visible keypoints, for the same iterates. The kept iterate is the
+// first with the least held-out error. This asks for more than the paper's rule: the iterate that must be
+// below tau_low is the kept one, and the kept one must not be the prediction itself (held_out_not_better),
+// because an adaptation that does not improve unseen points has not found a better body. Throws
+// std::invalid_argument if the lengths differ.
 manifests::Judgement judge_held_out(std::span<const double> curve, std::span<const double> held_out,
                                     const Thresholds& thresholds);
 

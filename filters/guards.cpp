@@ -77,7 +77,7 @@ int scaled_iterations(int iterations, int visible, int full_at) {
   if (iterations < 0 || visible < 0 || full_at < 0) {
     throw std::invalid_argument(
         fmt::format("scaled_iterations: got {} iterations, {} visible keypoints and full_at {}, expected "
-                    "none below 0",
+                    "numbers of 0 or more",
                     iterations, visible, full_at));
   }
   if (visible >= full_at) return iterations;

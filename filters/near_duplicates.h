@@ -1,4 +1,4 @@
-// Finding pictures that look alike among many, by their hashes.
+// Finds pictures that look alike among many, by their hashes.
 #pragma once
 
 #include <array>
@@ -12,22 +12,24 @@
 
 namespace q3d::filters {
 
-inline constexpr int kMaxHashDistance = 15;  // what HashIndex searches in one go
+inline constexpr int kMaxHashDistance = 15;  // the largest distance that HashIndex can search
 
-// Finds 64-bit hashes within a Hamming distance d. Multi-index hashing (Norouzi, Punjani, Fleet: "Fast Search
-// in Hamming Space with Multi-Index Hashing", 2012): of four bands of 16 bits one must differ in at most d /
-// 4, so each is searched for its own near values alone. Exact. Takes 48 bytes a hash and 1 MB: every band has
-// the hashes in its own order, so that a search reads few runs of memory instead of a thousand places.
+// Finds 64-bit hashes within a Hamming distance d, exactly, by multi-index hashing (Norouzi, Punjani, Fleet:
+// "Fast Search in Hamming Space with Multi-Index Hashing", 2012). Of four bands of 16 bits, one must differ
+// in at most d / 4 bits. Therefore each band is searched only for the values near its own. The index takes 48
+// bytes for each hash plus 1 MB. Every band keeps the hashes in its own order, so that a search reads few
+// runs of memory instead of a thousand places.
 class HashIndex {
  public:
-  // Throws std::invalid_argument unless 0 <= max_distance <= kMaxHashDistance, or for 2^32 hashes and more.
+  // Throws std::invalid_argument unless 0 <= max_distance <= kMaxHashDistance and there are fewer than 2^32
+  // hashes.
   HashIndex(std::span<const std::uint64_t> hashes, int max_distance);
 
   struct Match {
     std::uint32_t position = 0;  // of the hash, as given to the constructor
     int distance = 0;
   };
-  // All that lie within max_distance, each once, in no particular order.
+  // Returns all hashes within max_distance, each once, in no particular order.
   void search(std::uint64_t hash, std::vector<Match>& matches) const;
 
   std::size_t size() const { return size_; }
@@ -41,21 +43,23 @@ class HashIndex {
   std::size_t size_ = 0;
   int max_distance_;
   std::array<Band, 4> bands_;
-  std::vector<std::uint16_t> near_values_;  // differences of a band: all of at most max_distance / 4 bits
+  std::vector<std::uint16_t> near_values_;  // all differences of a band with at most max_distance / 4 bits
 };
 
 struct Likeness {
   std::uint32_t position = 0;  // of the reference
   int distance = 0;            // bits of 64
-  bool mirrored = false;       // it is the mirror image that looks alike
+  bool mirrored = false;       // true if the mirror image looks alike
 };
 
-// Of an index over the references' upright hashes the nearest to the query, upright or mirrored, within the
-// index's distance; of equals the upright, then the first. Threads may ask one index at once.
+// Returns the reference nearest to the query, upright or mirrored, within the index's distance. Of equally
+// near ones it is the upright one, then the first. `references` is an index over the references' upright
+// hashes. Several threads may use one index at once.
 std::optional<Likeness> nearest_likeness(const HashIndex& references, const manifests::PictureHash& query);
 
-// Groups of pictures that are linked by likeness within max_distance, two or more each: positions ascending,
-// groups by their first. Throws as HashIndex's constructor does.
+// Returns groups of pictures that are linked by likeness within max_distance. Each group has two or more
+// pictures; its positions ascend, and groups are ordered by their first position. Throws like HashIndex's
+// constructor.
 std::vector<std::vector<std::uint32_t>> groups_alike(std::span<const manifests::PictureHash> pictures,
                                                      int max_distance);
 

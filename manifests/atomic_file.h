@@ -1,4 +1,4 @@
-// Whole files or none: write under a temporary name, fsync, rename, fsync the folder.
+// Writes files completely or not at all: under a temporary name, then fsync, rename, and fsync of the folder.
 #pragma once
 
 #include <cstddef>
@@ -9,20 +9,21 @@
 
 namespace q3d::manifests {
 
-// On failure the temporary is removed, an older file at `path` stays as it was, and std::runtime_error names
-// the path and the system's reason (disk full, no permission, ...).
+// Writes `content` to `path`. If this fails, the temporary file is removed, an older file at `path` stays as
+// it was, and std::runtime_error names the path and the system's reason (disk full, no permission, ...).
 void write_file_atomically(const std::filesystem::path& path, std::span<const std::byte> content);
 void write_file_atomically(const std::filesystem::path& path, std::string_view content);
 
-// Makes a finished temporary file durable and gives it its name; removes it when that fails.
+// Makes a finished temporary file durable and renames it to `path`. If this fails, the temporary file is
+// removed.
 void commit_file(const std::filesystem::path& temporary, const std::filesystem::path& path);
 
 std::string read_file(const std::filesystem::path& path);  // throws std::runtime_error
 
-// fsync of a folder: makes the names in it durable. Throws std::runtime_error.
+// Calls fsync on a folder, which makes the names in it durable. Throws std::runtime_error.
 void sync_folder(const std::filesystem::path& folder);
 
-// Removes what a killed run left behind: files named *.tmp in `folder` (not recursive).
+// Removes the files that a killed run left behind: those named *.tmp in `folder` (not recursive).
 void remove_temporaries(const std::filesystem::path& folder);
 
 }  // namespace q3d::manifests

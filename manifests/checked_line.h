@@ -1,4 +1,4 @@
-// Text lines that carry their own checksum, for files that a killed process may leave half written.
+// Text lines with a checksum, for files that a killed process may leave half written.
 #pragma once
 
 #include <optional>
@@ -7,11 +7,11 @@
 
 namespace q3d::manifests {
 
-// "payload<TAB>check<LF>", check = the first 16 hex digits of the payload's SHA-256. The payload must not
-// contain a line feed; std::invalid_argument otherwise.
+// Returns "payload<TAB>check<LF>", where check is the first 16 hex digits of the payload's SHA-256. Throws
+// std::invalid_argument if the payload contains a line feed.
 std::string seal_line(std::string_view payload);
 
-// The payload of a line (without its line feed), or nothing when the check does not match.
+// Returns the payload of a line that is given without its line feed, or nothing if the check does not match.
 std::optional<std::string_view> open_line(std::string_view line);
 
 }  // namespace q3d::manifests

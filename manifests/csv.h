@@ -1,4 +1,4 @@
-// Comma-separated values, as RFC 4180 and Python's csv module have them.
+// Comma-separated values in the form of RFC 4180 and Python's csv module.
 #pragma once
 
 #include <cstddef>
@@ -7,19 +7,20 @@
 
 namespace q3d::manifests {
 
-// The text as one cell: quoted where it holds a comma, a quote or a line's end.
+// Returns the text as one cell. It is quoted if it contains a comma, a quote or the end of a line.
 std::string csv_cell(const std::string& text);
 
-// Cells of one line after the other. Lines end in LF or CRLF; empty ones are passed over.
+// Reads the cells of one line after the other. Lines end in LF or CRLF; empty lines are skipped.
 class CsvReader {
  public:
-  // `where` names the file in messages. The text outlives the reader.
+  // `where` names the file in messages. The text must outlive the reader.
   CsvReader(const std::string& text, std::string where) : text_(text), where_(std::move(where)) {}
 
-  // False at the end. Throws as fail() does for a quote that is not closed, or text after a closing one.
+  // Reads the next line. Returns false at the end of the text. Throws like fail() if a quote is not closed or
+  // if text follows a closing quote.
   bool next(std::vector<std::string>& cells);
 
-  // Throws std::runtime_error naming file and line, got and expected.
+  // Throws std::runtime_error that names file and line, what was found and what was expected.
   [[noreturn]] void fail(const std::string& got, const std::string& expected) const;
 
  private:
@@ -29,7 +30,7 @@ class CsvReader {
   const std::string& text_;
   std::string where_;
   std::size_t at_ = 0;
-  std::size_t line_ = 0;  // of the cells last read, from 1
+  std::size_t line_ = 0;  // line of the cells read last, from 1
 };
 
 }  // namespace q3d::manifests

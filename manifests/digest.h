@@ -1,4 +1,4 @@
-// SHA-256 digests of bytes and files, and a cache that spares reading unchanged files again.
+// SHA-256 digests of bytes and files, and a cache that avoids reading unchanged files again.
 #pragma once
 
 #include <cstddef>
@@ -19,7 +19,7 @@ std::string sha256(std::span<const std::byte> bytes);  // 64 lower-case hex digi
 std::string sha256(std::string_view text);
 std::string sha256_file(const std::filesystem::path& path);  // throws std::runtime_error when unreadable
 
-// SHA-256 of bytes that come in pieces.
+// Computes the SHA-256 of bytes that come in pieces.
 class Sha256 {
  public:
   Sha256();
@@ -33,16 +33,17 @@ class Sha256 {
   std::unique_ptr<evp_md_ctx_st, Free> context_;
 };
 
-// Remembers file digests by path, size, mtime and inode. Thread-safe. `verify` never uses it.
+// Remembers the digests of files by path, size, mtime and inode. Thread-safe. `verify` never uses it.
 //
-// A file that was modified less than two seconds before it was digested is not remembered: a later write
-// within the same tick of the file system's clock would leave size and mtime as they were.
+// The cache does not remember a file that was modified less than two seconds before it was digested. A later
+// write within the same tick of the file system's clock could leave size and mtime unchanged.
 class DigestCache {
  public:
-  // Loads the file if it is there; a damaged line is dropped. Throws std::runtime_error when unreadable.
+  // Loads the file if it exists; damaged lines are dropped. Throws std::runtime_error if the file is
+  // unreadable.
   explicit DigestCache(std::filesystem::path file);
   std::string digest(const std::filesystem::path& path);  // throws std::runtime_error when unreadable
-  // One checked line an entry, sorted by path; atomic. Throws std::runtime_error.
+  // Writes one checked line for each entry, sorted by path, atomically. Throws std::runtime_error.
   void save() const;
 
  private:

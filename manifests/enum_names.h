@@ -1,4 +1,4 @@
-// Stable names of enumerators that count up from 0.
+// Stable names of enumerators whose values count up from 0.
 #pragma once
 
 #include <algorithm>
@@ -9,7 +9,8 @@
 
 namespace q3d::manifests {
 
-// The enumerator at the position of `name` in `names`. Throws std::invalid_argument that lists the names.
+// Returns the enumerator at the position of `name` in `names`. Throws std::invalid_argument that lists the
+// names if `name` is not one of them.
 template <typename Enum, std::size_t N>
 Enum enum_from_name(std::string_view what, std::string_view name,
                     const std::array<std::string_view, N>& names) {

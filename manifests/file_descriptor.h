@@ -1,4 +1,4 @@
-// A POSIX file descriptor that closes itself, and reads and writes that are whole or throw.
+// A POSIX file descriptor that closes itself. Reads and writes are complete or throw.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +15,7 @@ namespace q3d::manifests {
 class FileDescriptor {
  public:
   FileDescriptor() = default;
-  // open(2) with O_CLOEXEC; a new file gets mode 0666 less the umask. Throws std::runtime_error.
+  // Calls open(2) with O_CLOEXEC. A new file gets mode 0666 less the umask. Throws std::runtime_error.
   FileDescriptor(const std::filesystem::path& path, int flags);
   ~FileDescriptor();
   FileDescriptor(FileDescriptor&& other) noexcept;
@@ -27,10 +27,11 @@ class FileDescriptor {
   std::uint64_t size() const;
   void write_all(std::span<const std::byte> bytes) const;
   void write_all(std::string_view text) const;
-  // Fills `bytes` from `offset` on, without moving the file position: safe from many threads at once.
+  // Fills `bytes` with the file's content from `offset` on. It does not move the file position, so many
+  // threads may call it at once.
   void read_at(std::uint64_t offset, std::span<std::byte> bytes) const;
   void sync() const;
-  // Network file systems report a failed write only here, so whoever wrote must call it.
+  // Closes the file. Network file systems report a failed write only here, so whoever wrote must call it.
   void close();
 
  private:

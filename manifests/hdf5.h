@@ -1,4 +1,4 @@
-// The one seam to the HDF5 C library: handles that close themselves, calls that are checked, one lock.
+// The only interface to the HDF5 C library: handles that close themselves, checked calls, and one lock.
 #pragma once
 
 #include <hdf5.h>
@@ -10,8 +10,9 @@
 
 namespace q3d::manifests::hdf5 {
 
-// Every call into HDF5, closing handles included, happens while a Session lives: the library has global state
-// and, depending on how it was built, no lock of its own. It also stops HDF5 from printing its error stack.
+// A Session must exist during every call into HDF5, including the closing of handles. The library has global
+// state and, depending on how it was built, no lock of its own. A Session also stops HDF5 from printing its
+// error stack.
 class Session {
  public:
   Session();
@@ -20,10 +21,10 @@ class Session {
   std::unique_lock<std::mutex> lock_;
 };
 
-// Throws std::runtime_error "<what>: <the library's innermost reason>".
+// Throws std::runtime_error with the text "<what>: <the library's innermost reason>".
 [[noreturn]] void throw_error(const std::string& what);
 
-// Passes a non-negative result on; throws as above for a negative one.
+// Returns a result that is not negative; throws like throw_error() for a negative one.
 template <typename Result>
 Result check(Result result, const std::string& what) {
   if (result < 0) throw_error(what);
@@ -32,7 +33,7 @@ Result check(Result result, const std::string& what) {
 
 class Handle {
  public:
-  // Takes ownership of `id`, which `closer` will close. Throws as above when it is negative.
+  // Takes ownership of `id`, which `closer` will close. Throws like throw_error() if `id` is negative.
   Handle(hid_t id, herr_t (*closer)(hid_t), const std::string& what) : id_(check(id, what)), close_(closer) {}
   ~Handle() {
     if (id_ >= 0) close_(id_);
@@ -40,7 +41,7 @@ class Handle {
   Handle(Handle&& other) noexcept : id_(std::exchange(other.id_, -1)), close_(other.close_) {}
   Handle& operator=(Handle&&) = delete;
   hid_t get() const { return id_; }
-  // Closes now; throws as above when that fails, which for a file means that it is incomplete.
+  // Closes now. Throws like throw_error() if this fails, which for a file means that it is incomplete.
   void close(const std::string& what) { check(close_(std::exchange(id_, -1)), what); }
 
  private:
@@ -48,10 +49,11 @@ class Handle {
   herr_t (*close_)(hid_t);
 };
 
-// The names in a group, sorted. Throws as check() does.
+// Returns the names in a group, sorted. Throws like check().
 //
-// HDF5 1.10 frees memory that it never set when a damaged group cannot be listed by index, or in another
-// order than the file's own; so this walks in native order, and other code should not list by index either.
+// HDF5 1.10 frees memory that it never set when a damaged group cannot be listed by index, or in an order
+// other than the file's own. Therefore this function walks in native order, and other code should not list by
+// index either.
 std::vector<std::string> link_names(hid_t group, const std::string& what);
 
 }  // namespace q3d::manifests::hdf5

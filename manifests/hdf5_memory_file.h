@@ -11,15 +11,15 @@
 
 namespace q3d::manifests::hdf5 {
 
-// Use it while a Session lives. Equal calls give equal bytes: no times, fixed library-version bounds. All
-// members throw std::runtime_error naming the attribute or dataset.
+// Use it only while a Session exists. Equal calls give equal bytes, because the file has no times and its
+// library-version bounds are fixed. All members throw std::runtime_error that names the attribute or dataset.
 class MemoryFile {
  public:
   MemoryFile();
 
-  // A scalar attribute of the root group.
+  // Adds a scalar attribute to the root group.
   void attribute(const std::string& name, hid_t type, const void* value);
-  // A contiguous dataset, complete.
+  // Adds a complete, contiguous dataset.
   void dataset(const std::string& name, hid_t type, const std::vector<hsize_t>& extents, const void* data);
   // Closes the file and returns its bytes. Call once, at the end.
   std::vector<std::byte> finish();

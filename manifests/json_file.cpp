@@ -19,7 +19,7 @@ std::string read_text(const std::filesystem::path& file) {
   const auto size = std::filesystem::file_size(file, error);
   if (error || !std::filesystem::is_regular_file(file)) {
     throw std::runtime_error(fmt::format("{}: got {}, expected an annotation file", file.string(),
-                                         error ? error.message() : "no regular file"));
+                                         error ? error.message() : "something that is not a regular file"));
   }
   if (size > kMaxAnnotationBytes) {
     throw std::runtime_error(fmt::format("{}: got {} bytes, expected an annotation file of at most {}",

@@ -1,4 +1,4 @@
-// Keeps a second builder off an output folder.
+// A lock that stops a second build from using the same output folder.
 #pragma once
 
 #include <filesystem>
@@ -7,10 +7,10 @@
 
 namespace q3d::manifests {
 
-// Holds an advisory lock (flock) on `<folder>/.lock` until destroyed; the kernel drops it when the process
-// dies. The file says who holds it and is left in place: removing it would let two builders lock two files of
-// that name. Throws std::runtime_error that names the holder's process, host and start when the folder is in
-// use, and when the folder is absent or not writable.
+// Holds an advisory lock (flock) on `<folder>/.lock` until it is destroyed; the kernel releases the lock when
+// the process dies. The file says who holds the lock. It is never removed, because then two builds could lock
+// two different files of that name. Throws std::runtime_error if the folder is in use, with the process, host
+// and start of the holder, and if the folder is absent or not writable.
 class FolderLock {
  public:
   explicit FolderLock(const std::filesystem::path& folder);

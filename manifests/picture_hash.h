@@ -1,4 +1,5 @@
-// What a picture looks like, in 64 bits: loaders make it, filters compare it, the pipeline remembers it.
+// A 64-bit hash of what a picture looks like. Loaders compute it, filters compare it, and the pipeline stores
+// it.
 #pragma once
 
 #include <cstdint>
@@ -6,8 +7,8 @@
 namespace q3d::manifests {
 
 struct PictureHash {
-  std::uint64_t upright = 0;   // of the picture
-  std::uint64_t mirrored = 0;  // of its left-right mirror image
+  std::uint64_t upright = 0;   // hash of the picture
+  std::uint64_t mirrored = 0;  // hash of its left-right mirror image
   bool operator==(const PictureHash&) const = default;
 };
 

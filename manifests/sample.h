@@ -1,4 +1,4 @@
-// The sample record: what every loader produces and every stage consumes.
+// The sample record, which every loader produces and every stage consumes.
 //
 // It is a plain value without tensors, images or library types, so that loaders, filters and the pipeline can
 // share it without sharing their dependencies.
@@ -16,9 +16,10 @@ inline constexpr int kNumKeypoints = 26;  // Animal3D / SMAL keypoints
 inline constexpr int kNumJoints = 35;     // SMAL joints; joint 0 carries the global orientation
 inline constexpr int kNumBetas = 41;      // SMAL shape coefficients
 
-// One annotated keypoint in pixels of the source image as stored (EXIF orientation never applied), origin
-// top-left. `v` is the file's own value, kept verbatim (-1, 0, 1, 2, or a likelihood). `weight` is what the
-// toolkit uses: 0 when the keypoint is not labelled, else 1 or the likelihood. Only weight > 0 is visible.
+// One annotated keypoint, in pixels of the source image as stored (EXIF orientation is never applied), with
+// the origin at the top left. `v` is the file's own value, unchanged (-1, 0, 1, 2, or a likelihood). `weight`
+// is what the toolkit uses: 0 if the keypoint is not labelled, else 1 or the likelihood. A keypoint is
+// visible if its weight is greater than 0.
 struct Keypoint {
   double x_px = 0.0;
   double y_px = 0.0;
@@ -39,7 +40,7 @@ enum class Family : std::int8_t { none = -1, felidae = 0, canidae, equidae, bovi
 std::string_view to_string(Family family);
 Family family_from_string(std::string_view name);  // throws std::invalid_argument on an unknown name
 
-// 3D truth as an annotation file gives it (absent for 2D-only sets).
+// The body of an annotation file. Sets with 2D keypoints only have none.
 struct BodyTruth {
   bool has_pose = false;   // not all 105 numbers are zero
   bool has_betas = false;  // not all 41 numbers are zero
@@ -50,7 +51,8 @@ struct BodyTruth {
   std::array<float, kNumKeypoints * 3> keypoints_3d{};  // SMAL units (about metres), y down
 };
 
-// Why a sample is failed or discarded. The names are stable: they are written into lists and shards.
+// Why a sample failed or was discarded. The names must not change, because they are written into lists and
+// shards.
 enum class Reason : std::uint8_t {
   none,
   // failed while reading the annotation
@@ -64,7 +66,7 @@ enum class Reason : std::uint8_t {
   no_visible_keypoints,
   record_malformed,
   image_not_listed,
-  pose_missing,     // the build wants the file's own body as the label, and the record has none
+  pose_missing,     // the label must come from the file's body, but the record has none
   not_a_quadruped,  // left out by the species rule (birds, primates, ...)
   // failed while reading the picture
   image_missing,
@@ -84,7 +86,7 @@ enum class Reason : std::uint8_t {
   scaled_gain_too_small,  // gain < delta within the fewer iterations that few visible keypoints allow
   held_out_not_better,    // adaptation brings the held-out keypoints no closer
   pose_implausible,       // the pose is too far from the prior
-  limbs_implausible,      // a limb's length is too far from those of the families
+  limbs_implausible,      // the length of a limb is too far from those of the families
   left_right_swapped,     // the label fits the annotation better with left and right exchanged
   mask_mismatch,          // the body's silhouette covers too little of the mask, or too much beside it
   // discarded by the user

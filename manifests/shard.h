@@ -15,9 +15,9 @@ namespace q3d::manifests {
 
 inline constexpr int kShardSchema = 1;
 
-// One labelled sample. Its record comes back from a shard without absolute paths. Pixel quantities are of the
-// source image unless they say otherwise; crop units are those of the network's crop (side 1, range [-0.5,
-// 0.5]).
+// One labelled sample. A record that is read from a shard has no absolute paths. Pixel quantities are pixels
+// of the source image unless stated otherwise. Crop units are those of the network's crop (side 1, range
+// [-0.5, 0.5]).
 struct ShardSample {
   SampleRecord record;
   std::string image_sha256;  // digest of the source file
@@ -57,25 +57,26 @@ struct ShardHeader {
 };
 
 // Writes one shard atomically and returns its SHA-256. Equal input gives equal bytes. Absolute paths are not
-// written. Throws std::runtime_error naming the path (disk full, ...) and std::invalid_argument naming the
-// sample when it cannot be in a shard: a failed record, or a crop where the header says "reference" and the
-// reverse.
+// written. Throws std::runtime_error that names the path (disk full, ...). Throws std::invalid_argument that
+// names a sample which cannot be in a shard: a failed record, a crop although the header says "reference", or
+// no crop although it does not.
 std::string write_shard(const std::filesystem::path& path, const ShardHeader& header,
                         const std::vector<ShardSample>& samples);
 
-// An open shard. Reads take no lock and may run in many threads at once.
+// An open shard. Reads take no lock, so many threads may read at once.
 class ShardReader {
  public:
-  // Checks magic, schema and completeness, in that order, and refuses what it does not know.
-  // Throws std::runtime_error naming path, dataset, got, expected and what to do.
+  // Checks magic, schema and completeness, in that order, and refuses a file that it does not know. Throws
+  // std::runtime_error that names path and dataset, what was found, what was expected and what to do.
   explicit ShardReader(const std::filesystem::path& path);
 
   const ShardHeader& header() const { return header_; }
   std::int64_t rows() const { return table_.rows(); }
-  // Single columns of some rows, for whoever needs only those.
+  // Gives access to single columns of some rows.
   const TableReader& table() const { return table_; }
-  // Rows [first, first + count), whole. Throws std::out_of_range for rows that the shard lacks and
-  // std::runtime_error naming path, column and row for a value that schema 1 does not know.
+  // Returns the rows [first, first + count) with all columns. Throws std::out_of_range for rows that the
+  // shard lacks, and std::runtime_error that names path, column and row for a value that schema 1 does not
+  // know.
   std::vector<ShardSample> samples(std::int64_t first, std::int64_t count) const;
 
  private:
@@ -87,6 +88,6 @@ struct Shard {
   ShardHeader header;
   std::vector<ShardSample> samples;
 };
-Shard read_shard(const std::filesystem::path& path);  // all of it; throws as ShardReader
+Shard read_shard(const std::filesystem::path& path);  // the whole shard; throws like ShardReader
 
 }  // namespace q3d::manifests

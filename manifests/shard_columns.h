@@ -1,5 +1,5 @@
-// Schema 1, column by column: the one place that the shard's writer, reader, self-description and document
-// agree with.
+// Schema 1, column by column. The shard's writer, its reader, its self-description and the document all
+// follow this list.
 #pragma once
 
 #include <cstddef>
@@ -17,7 +17,7 @@ namespace q3d::manifests {
 struct NumberColumn {
   ElementType type;
   std::vector<std::int64_t> row_shape;
-  // Copy one row from and to the sample; `load` may throw std::runtime_error.
+  // These copy one row from the sample and to the sample. `load` may throw std::runtime_error.
   std::function<void(const ShardSample&, std::byte* row)> store;
   std::function<void(ShardSample&, const std::byte* row)> load;
 };
@@ -31,12 +31,13 @@ struct BytesColumn {
 
 struct ShardColumn {
   std::string name;
-  std::string units;  // empty: none
+  std::string units;  // empty if the column has none
   std::string meaning;
   std::variant<NumberColumn, TextColumn, BytesColumn> content;
 };
 
-// In the order of the document. Loading follows it: truth_present comes before what depends on it.
+// The columns in the order of the document. Loading uses the same order, so truth_present comes before the
+// columns that depend on it.
 const std::vector<ShardColumn>& shard_columns();
 
 std::string dtype_of(const ShardColumn& column);  // "float32", ..., "text", "bytes"

@@ -1,10 +1,10 @@
-// A table of equal-length columns in one HDF5 file: the container of shards and of stage outputs.
+// A table of columns of equal length in one HDF5 file. Shards and the outputs of stages are such tables.
 //
-// Numeric columns are datasets (rows, ...row_shape); text is fixed-width UTF-8, padded with NUL;
-// variable-length bytes (pictures) are one flat uint8 dataset `<name>` and one `<name>_offsets` of rows + 1
-// int64. All datasets are contiguous, little-endian and unfiltered. The root group carries `rows` (int64) and
-// text attributes. Equal tables give equal bytes: times are off, the library-version bounds are fixed,
-// and datasets are written by kind and name.
+// A numeric column is a dataset (rows, ...row_shape). Text is fixed-width UTF-8, padded with NUL. A column of
+// variable-length bytes (pictures) is one flat uint8 dataset `<name>` and one dataset `<name>_offsets` of
+// rows + 1 int64. All datasets are contiguous, little-endian and unfiltered. The root group has the attribute
+// `rows` (int64) and text attributes. Equal tables give equal bytes: times are off, the library-version
+// bounds are fixed, and datasets are written in the order of kind and name.
 #pragma once
 
 #include <cstddef>
@@ -35,15 +35,15 @@ template <> struct element_type<std::int64_t> { static constexpr ElementType val
 
 struct NumericColumn {
   ElementType type = ElementType::float32;
-  std::vector<std::int64_t> row_shape;  // empty: one number a row
+  std::vector<std::int64_t> row_shape;  // empty: one number in each row
   std::vector<std::byte> data;          // rows * product(row_shape) elements, row-major
 
-  // View as T; throws std::logic_error when T is not the column's type.
+  // Returns the data as numbers of type T. Throws std::logic_error if T is not the column's type.
   template <typename T>
   std::span<const T> as() const;
 };
 
-// Numbers in one row: the product of the extents.
+// Returns how many numbers one row has: the product of the extents.
 std::int64_t elements_per_row(const std::vector<std::int64_t>& row_shape);
 
 struct Table {
@@ -53,23 +53,25 @@ struct Table {
   std::map<std::string, std::vector<std::vector<std::byte>>> blobs;
   std::map<std::string, std::string> attributes;  // text attributes of the file's root group
 
-  // Appends `values` (rows * product(row_shape) of them) as a column; throws std::logic_error on a wrong
-  // count or a name already taken.
+  // Adds a column with `values`, which are rows * product(row_shape) numbers. Throws std::logic_error if
+  // their count is wrong or the name is already taken.
   template <typename T>
   void add(const std::string& name, std::vector<std::int64_t> row_shape, std::span<const T> values);
-  // The column's values; throws std::runtime_error naming the column when it is absent or of another type.
+  // Returns the values of a column. Throws std::runtime_error that names the column if it is absent or has
+  // another type.
   template <typename T>
   std::span<const T> column(const std::string& name) const;
 };
 
 // Writes the table under a temporary name, syncs it and renames it. Returns the file's SHA-256. The file is
-// composed in memory first: about twice the table's size for the time of the call.
-// Throws std::runtime_error naming the path (disk full, no permission, a NUL inside a text) and
-// std::logic_error for a malformed table (column lengths that differ from `rows`, names that are not
-// [A-Za-z0-9_]+ or end in "_offsets", an attribute over 60,000 bytes).
+// composed in memory first, which takes about twice the table's size during the call. Throws
+// std::runtime_error that names the path (disk full, no permission, a NUL inside a text). Throws
+// std::logic_error for a malformed table: column lengths that differ from `rows`, names that are not
+// [A-Za-z0-9_]+ or end in "_offsets", or an attribute over 60,000 bytes.
 std::string write_table(const std::filesystem::path& path, const Table& table);
 
-// Reads the whole table. Throws std::runtime_error naming path, dataset, got and expected.
+// Reads the whole table. Throws std::runtime_error that names path and dataset, what was found and what was
+// expected.
 Table read_table(const std::filesystem::path& path);
 
 }  // namespace q3d::manifests

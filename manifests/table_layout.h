@@ -1,4 +1,4 @@
-// Where the columns of a table lie in its file.
+// The positions of a table's columns in its file.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@ struct TableLayout {
   std::map<std::string, TableReader::Column> columns;
 };
 
-// Opens the file a second time, with HDF5, and checks everything that TableReader promises.
+// Opens the file a second time, with HDF5, and makes all the checks that TableReader promises.
 TableLayout read_table_layout(const FileDescriptor& file);
 
 }  // namespace q3d::manifests

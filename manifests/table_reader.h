@@ -1,4 +1,4 @@
-// Reading parts of a table: what training does, batch by batch, from many shards.
+// Reads parts of a table. Training does this batch by batch, from many shards.
 #pragma once
 
 #include <cstddef>
@@ -13,12 +13,12 @@
 
 namespace q3d::manifests {
 
-// The text attributes alone: what must be known before the columns are looked at (format, schema). Throws
-// std::runtime_error naming the path when it is not a readable HDF5 file.
+// Reads only the text attributes, which must be known before the columns are read (format, schema). Throws
+// std::runtime_error that names the path if it is not a readable HDF5 file.
 std::map<std::string, std::string> read_table_attributes(const std::filesystem::path& path);
 
-// HDF5 is used only to find out where each column lies, in the constructor. The rows themselves are then read
-// from the file directly, so reads take no lock, may run in many threads, and survive a fork.
+// The constructor uses HDF5 to find out where each column lies. The rows are then read from the file
+// directly. Reads therefore take no lock, may run in many threads, and survive a fork.
 class TableReader {
  public:
   enum class Kind : std::uint8_t { numeric, text, blob };
@@ -28,11 +28,12 @@ class TableReader {
     std::vector<std::int64_t> row_shape;    // of numeric columns
     std::int64_t row_bytes = 0;             // bytes of a number row, width of a text; 0 for blobs
     std::uint64_t file_offset = 0;
-    std::vector<std::int64_t> blob_offsets;  // rows + 1, ascending from 0; of blobs
+    std::vector<std::int64_t> blob_offsets;  // of blobs: rows + 1 offsets, ascending from 0
   };
 
-  // Opens and checks the whole layout: signature, types, extents, offsets, and that every column lies inside
-  // the file. Throws std::runtime_error naming path, dataset, got and expected.
+  // Opens the file and checks its whole layout: signature, types, extents, offsets, and that every column
+  // lies inside the file. Throws std::runtime_error that names path and dataset, what was found and what was
+  // expected.
   explicit TableReader(const std::filesystem::path& path);
 
   const std::filesystem::path& path() const { return file_.path(); }
@@ -40,8 +41,8 @@ class TableReader {
   const std::map<std::string, std::string>& attributes() const { return attributes_; }
   const std::map<std::string, Column>& columns() const { return columns_; }
 
-  // Rows [first, first + count) of a column. Throw std::runtime_error naming path and column when it is
-  // absent or of another kind, std::out_of_range for rows that the table lacks.
+  // These return the rows [first, first + count) of a column. They throw std::runtime_error that names path
+  // and column if it is absent or of another kind, and std::out_of_range for rows that the table lacks.
   NumericColumn numeric(const std::string& name, std::int64_t first, std::int64_t count) const;
   std::vector<std::string> text(const std::string& name, std::int64_t first, std::int64_t count) const;
   std::vector<std::vector<std::byte>> blobs(const std::string& name, std::int64_t first,

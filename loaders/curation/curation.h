@@ -1,4 +1,5 @@
-// A balanced subset of a large set of pictures, by a rule: which to take, and why each other is left.
+// Chooses a balanced subset of a large set of pictures by a rule, and says for every other picture why it is
+// left out.
 #pragma once
 
 #include <cstdint>
@@ -11,54 +12,56 @@
 
 namespace q3d::loaders::curation {
 
-// One picture of the whole set, whatever the number of animals in it.
+// One picture of the whole set, with any number of animals in it.
 struct CuratedPicture {
   std::string split;      // train, test
   std::string image_ref;  // as the annotation file names it
   std::string source;     // sub-dataset
-  std::string species;    // as its name or its source tells; empty when nothing does
-  std::string clip;       // the video that it is a frame of (loaders/curation/clip.h); empty when of none
-  bool usable = true;     // it has a record that can be used
+  std::string species;    // from its name or its source; empty if neither tells it
+  std::string clip;       // the video that it is a frame of (loaders/clip.h); empty if it is none
+  bool usable = true;     // at least one of its records can be used
 };
 
 struct CurationRule {
-  // A species of the subset -> the names that count as it. A picture's species is the one that lists its
-  // name, or else the name without its first words: "polar bear" counts as one that lists "bear".
+  // For each species of the subset, the names that count as it. A picture belongs to the species that lists
+  // its species name. If none does, the first words of the name are dropped one by one: "polar bear" counts
+  // as the species that lists "bear".
   std::map<std::string, std::vector<std::string>> species;
-  std::map<std::string, std::int64_t> pictures;  // split -> how many to take, if there are as many
-  std::optional<std::int64_t> cap;               // most pictures of one species in one split
+  std::map<std::string, std::int64_t> pictures;  // split -> how many to take, if there are enough
+  std::optional<std::int64_t> cap;               // the largest number of pictures of one species in one split
   std::uint64_t seed = 0;
 };
 
-// What became of a picture. The names are stable: they are written into the list.
+// The decision about a picture. The names must not change, because they are written into the list.
 enum class Choice : std::uint8_t {
   chosen,
   unusable,             // none of its records can be used
-  species_unknown,      // neither name nor source tells it
-  species_not_listed,   // by the rule's species
-  clip_in_other_split,  // its video has more frames in another split
-  not_drawn,            // its species has its share without it
+  species_unknown,      // neither the name nor the source tells the species
+  species_not_listed,   // the species is none of the rule's
+  clip_in_other_split,  // its video stays in another split, which has more of its frames
+  not_drawn,            // its species already has its share
 };
 std::string_view to_string(Choice choice);
 
 struct Curated {
-  std::string species;  // of the subset; as told where it is not listed
+  std::string species;  // species of the subset; if it is not listed, the species of the picture
   Choice choice = Choice::not_drawn;
 };
 
-// Splits are kept: no picture changes its side. A video whose frames lie in several splits is kept whole
-// where most of its usable frames of listed species are (of equals the split first in the alphabet), and left
-// out of the others. Then each split is drawn by itself: its pictures are shared out by fair_shares(), and
-// within a species every video gives one frame before any gives a second, in an order by SHA-256 of seed and
-// name, which pictures that are added later do not disturb.
+// Chooses pictures by the rule. Splits are kept: no picture moves to another split. If the frames of a video
+// lie in several splits, the video is kept in the split that has most of its usable frames of listed species
+// (of equal splits, the first in the alphabet), and left out of the others. Then each split is drawn by
+// itself. fair_shares() shares out its pictures. Within a species, every video gives one frame before any
+// video gives a second. The order comes from the SHA-256 of seed and name, so pictures that are added later
+// do not change it.
 //
-// One result a picture, in the order given. Throws std::invalid_argument when a name is listed for two
-// species.
+// Returns one result for each picture, in the order given. Throws std::invalid_argument if a name is listed
+// for two species.
 std::vector<Curated> curate(std::span<const CuratedPicture> pictures, const CurationRule& rule);
 
-// Shares that are as equal as what is there allows: min(available, cap, level) with the one level at which
-// they add up to `total`; where no whole level does, the first species with more get one more. All that the
-// cap lets through when there is less than `total`.
+// Returns shares that are as equal as the available numbers allow: min(available, cap, level), with the one
+// level at which they add up to `total`. If no whole level does, the first species that have more get one
+// more. If there is less than `total`, everything that the cap allows is taken.
 std::vector<std::int64_t> fair_shares(std::span<const std::int64_t> available, std::int64_t total,
                                       std::optional<std::int64_t> cap);
 

@@ -1,5 +1,5 @@
-// What a sub-dataset's own annotation files tell of its pictures, where their names in a collection do not:
-// species and video.
+// Reads species and videos of pictures from the annotation files of a sub-dataset itself, for pictures whose
+// names in a collection do not tell them.
 #pragma once
 
 #include <cstddef>
@@ -12,22 +12,23 @@
 namespace q3d::loaders::curation {
 
 struct SourceLabel {
-  std::string species;  // empty where the picture's animals are of several
-  std::string clip;     // empty where the file tells of no video
+  std::string species;  // empty if the picture shows animals of several species
+  std::string clip;     // empty if the file names no video
   bool operator==(const SourceLabel&) const = default;
 };
 
-// Pictures by the stem of their file name.
+// The labels of pictures, by the stem of their file name.
 class SourceLabels {
  public:
-  // Adds a COCO-style file: `images` (a list, or an object from id to file name as AnimalPose has it),
-  // `annotations` with category_id, and `categories`. A picture's species is its annotations' category; its
-  // video is `video_id`, else the folder of its name where the pictures lie in more than one. Stems that two
-  // pictures share keep what both agree on. Throws std::runtime_error naming file, got and expected.
+  // Adds a COCO-style file with `images` (a list, or an object from id to file name as in AnimalPose),
+  // `annotations` with category_id, and `categories`. A picture's species is the category of its annotations.
+  // Its video is `video_id`; without one, it is the folder of its name if the pictures lie in more than one
+  // folder. If two pictures have the same stem, only what both agree on is kept. Throws std::runtime_error
+  // that names the file, what was found and what was expected.
   void add(const std::filesystem::path& file);
 
-  // Of a picture as a collection names it: by its stem, or by that without the image id that SuperAnimal
-  // appends. Nothing for a picture that no file lists.
+  // Returns the label of a picture as a collection names it. It is searched by its stem, then by its stem
+  // without the image id that SuperAnimal appends. Returns nothing for a picture that no file lists.
   std::optional<SourceLabel> find(std::string_view file_name) const;
 
   std::size_t size() const { return labels_.size(); }

@@ -47,10 +47,10 @@ std::vector<std::string> keypoint_names(const nlohmann::json& document, const Lo
     if (!lists_any) continue;
     std::vector<std::string> here = names_in(category);
     if (!names.empty() && here != names) {
-      throw std::runtime_error(
-          fmt::format("{}: categories[{}]: keypoints: got names that differ from an earlier category's, "
-                      "expected one list of keypoints a file",
-                      loading.file.string(), i));
+      throw std::runtime_error(fmt::format(
+          "{}: categories[{}]: keypoints: got names that differ from those of an earlier category, "
+          "expected the same list of keypoints in all categories of a file",
+          loading.file.string(), i));
     }
     names = std::move(here);
   }
@@ -63,15 +63,17 @@ std::vector<int> order_of(const nlohmann::json& document, const keypoints::Topol
   std::iota(in_order.begin(), in_order.end(), 0);
   const std::vector<std::string> names = keypoint_names(document, loading);
   if (names.empty()) {
-    loading.notes.add(
-        fmt::format("no category names its keypoints; taken as {} in its own order", topology.name));
+    loading.notes.add(fmt::format(
+        "no category lists the names of its keypoints; they are read in the order of the topology {}",
+        topology.name));
     return in_order;
   }
   try {
     std::vector<int> order = keypoints::order_in_file(topology, names);
     if (order != in_order) {
-      loading.notes.add(
-          fmt::format("the file's keypoints are not in {}'s order; taken by name", topology.name));
+      loading.notes.add(fmt::format(
+          "the file's keypoints are not in the order of the topology {}; they are matched by name",
+          topology.name));
     }
     return order;
   } catch (const std::invalid_argument& error) {
@@ -115,7 +117,8 @@ CocoFile index_file(const nlohmann::json& document, const keypoints::Topology& t
                 .order = order_of(document, topology, loading),
                 .image_of_id = {}};
   if (const std::size_t repeated = index_images(images, file); repeated > 0) {
-    loading.notes.add(fmt::format("images that repeat an id (the first of each is taken): {}", repeated));
+    loading.notes.add(fmt::format(
+        "images that repeat the id of an earlier image (the first image of an id is used): {}", repeated));
   }
   std::unordered_set<std::int64_t> ids;
   std::unordered_set<std::int64_t> used_images;
@@ -194,14 +197,14 @@ Dataset load_coco(const nlohmann::json& document, const keypoints::Topology& top
   const pictures::BoxVote vote = pictures::vote_on_boxes(records);
   if (vote.corners > 0) {
     loading.notes.add(fmt::format(
-        "boxes: {} records fit as x1, y1, x2, y2 alone and {} as x, y, width, height alone; read as {}",
+        "boxes: {} records fit only as x1, y1, x2, y2 and {} only as x, y, width, height; all are read as {}",
         vote.corners, vote.extents, vote.is_corners() ? "x1, y1, x2, y2" : "x, y, width, height"));
   }
   for (std::size_t i = 0; i < records.size(); ++i) {
     if (made_boxes[i]) {
       records[i].box = *made_boxes[i];
-      loading.notes.count(fmt::format("no box: made around the keypoints, with a margin of {} of its longer "
-                                      "side",
+      loading.notes.count(fmt::format("no box: it was made around the keypoints, with a margin of {} of its "
+                                      "longer side",
                                       *rules.box_margin),
                           records[i].id);
     } else if (vote.is_corners()) {

@@ -1,5 +1,5 @@
-// What COCO-style files share: images that annotations point to, keypoints named by a category, and the two
-// ways of writing boxes.
+// The parts that COCO-style files have in common: images that annotations point to, keypoints named by a
+// category, and the two ways of writing boxes.
 #pragma once
 
 #include <functional>
@@ -12,22 +12,23 @@
 
 namespace q3d::loaders::formats {
 
-// What a format adds to a sample whose picture, box and 26 keypoints have been read.
+// Reads what a format adds to a sample after its picture, box and 26 keypoints have been read.
 using CocoAddition =
     std::function<void(Loading& loading, RecordReader& annotation, manifests::SampleRecord& sample)>;
 
 struct CocoRules {
   CocoAddition add;
-  // Called with an annotation's keypoints in the topology's order, before they become 26.
+  // Is called with an annotation's keypoints in the topology's order, before they are mapped to the 26.
   std::function<void(std::span<manifests::Keypoint> keypoints)> weigh{};
-  // Where an annotation has no box: one around its keypoints (box_around). Without a margin it fails.
+  // If an annotation has no box, one is made around its keypoints with this margin (box_around). Without a
+  // margin the record fails.
   std::optional<double> box_margin{};
 };
 
-// All annotations in file order. Keypoints are taken by the names that the categories list, in whatever
-// order. Boxes are read as the majority of the file tells (vote_on_boxes), then checked. `images` is COCO's
-// list, or an object from id to file name. Throws std::runtime_error when images or annotations are missing,
-// two categories list different keypoints, or their names are not the topology's.
+// Loads all annotations in file order. Keypoints are found by the names that the categories list, in any
+// order. Boxes are read as the majority of the file indicates (vote_on_boxes) and then checked. `images` is
+// COCO's list, or an object from id to file name. Throws std::runtime_error if images or annotations are
+// missing, if two categories list different keypoints, or if their names are not those of the topology.
 Dataset load_coco(const nlohmann::json& document, const keypoints::Topology& topology, Loading& loading,
                   const CocoRules& rules);
 

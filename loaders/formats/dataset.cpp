@@ -93,13 +93,15 @@ void set_family(Loading& loading, std::optional<Family> stated, std::optional<Fa
   sample.family = stated ? *stated : from_table.value_or(Family::none);
   if (stated && from_table && *stated != *from_table) {
     loading.notes.count(
-        fmt::format("species \"{}\" is {} in the file and {} in the table (the file's is kept)",
-                    sample.species, manifests::to_string(*stated), manifests::to_string(*from_table)),
+        fmt::format(
+            "species \"{}\" is {} in the file and {} in the species table (the file's family is used)",
+            sample.species, manifests::to_string(*stated), manifests::to_string(*from_table)),
         sample.id);
   }
   if (!stated && !from_table && !sample.species.empty()) {
     loading.notes.count(
-        fmt::format("species \"{}\" is not in the family table (family none)", sample.species), sample.id);
+        fmt::format("species \"{}\" is not in the species table, so it has no family", sample.species),
+        sample.id);
   }
 }
 
@@ -108,10 +110,12 @@ Dataset finished(Loading& loading, std::vector<SampleRecord> records) {
     if (count > 0) loading.notes.add(fmt::format("{}: {}", text, count));
   };
   const PictureFinder& finder = loading.finder;
-  note("absolute names of another disk, found by their last parts", finder.found_by_tail());
-  note("of these, names for a file that another of them names too (one must be wrong)",
+  note("pictures with an absolute name from another disk, found by the last parts of the name",
+       finder.found_by_tail());
+  note("of these, names that lead to the same file as an earlier name (one of them must be wrong)",
        finder.shared_files());
-  note("picture names that differ from the file's in letter case, '+' or .jpeg", finder.found_by_spelling());
+  note("picture names that differ from the name of the file in letter case, '+' or .jpeg",
+       finder.found_by_spelling());
   std::vector<std::filesystem::path> files{loading.file};
   files.insert(files.end(), loading.more_files.begin(), loading.more_files.end());
   return {std::move(records), loading.notes.list(), std::move(files)};

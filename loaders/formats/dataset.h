@@ -1,4 +1,4 @@
-// Annotation files -> sample records.
+// Loads annotation files as sample records.
 #pragma once
 
 #include <filesystem>
@@ -15,38 +15,42 @@ struct DatasetOptions {
   std::string split;           // second part of every sample id
   std::filesystem::path root;  // pictures and masks are looked up below this folder, and never outside it
   std::filesystem::path annotations;  // JSON file; relative to root unless absolute
-  // Folder of the pictures, relative to root unless absolute; naming one outside the root allows it. Empty is
-  // the format's own: root (prima), root/images (superanimal), root/dataset (animal_kingdom), or root where
-  // that folder does not exist.
+  // Folder of the pictures, relative to root unless it is absolute. If the user names a folder outside the
+  // root, pictures may lie there. If it is empty, the format's own folder is used: root (prima), root/images
+  // (superanimal), root/dataset (animal_kingdom), or root if that folder does not exist.
   std::filesystem::path images;
 
-  // Of the formats "coco" and "deeplabcut" alone.
+  // The following options belong to the formats "coco" and "deeplabcut" only.
   std::filesystem::path
       topology{};         // JSON file that names the keypoints (loaders/keypoints/topology_file.h); required
-  std::string species{};  // of all animals; empty takes what the file tells, if anything
-  double min_confidence = 0.6;  // keypoints of less confidence get weight 0 (DeepLabCut's p-cutoff)
-  double box_margin = 0.1;      // a box made from keypoints is wider by this share of its longer side
+  std::string species{};  // species of all animals; if empty, it comes from the file, if the file states it
+  double min_confidence = 0.6;  // keypoints with less confidence get weight 0 (DeepLabCut's p-cutoff)
+  double box_margin = 0.1;      // a box made from keypoints is enlarged by this share of its longer side
 };
 
 struct Dataset {
-  std::vector<manifests::SampleRecord> records;  // file order; what cannot be used carries its failure
-  std::vector<std::string> notes;                // what a user should know (boxes read as xyxy, ...)
-  std::vector<std::filesystem::path> files;      // what was read, besides pictures: annotations, topology
+  std::vector<manifests::SampleRecord> records;  // file order; unusable records carry their failure
+  std::vector<std::string> notes;                // remarks for the user (boxes read as xyxy, ...)
+  std::vector<std::filesystem::path> files;      // files that were read, except pictures
 };
 
-// "prima": the JSON of PRIMA and AniMer (Animal3D, CtrlAni3D and sets converted to it).
-// "superanimal": SuperAnimal-Quadruped's 39-keypoint COCO. "animal_kingdom": its 23-keypoint list of records,
-// or its COCO file, told apart by content. "coco": any other COCO keypoints, by a topology file (AP-10K,
-// AnimalPose, a lab's own). "deeplabcut": DeepLabCut's .h5 and .csv, labels and predictions; `annotations` is
-// one of them, or a folder of a project with its CollectedData files.
+// Returns the names of the formats.
+//
+// - "prima": the JSON of PRIMA and AniMer (Animal3D, CtrlAni3D and sets converted to it).
+// - "superanimal": SuperAnimal-Quadruped's COCO file with 39 keypoints.
+// - "animal_kingdom": its list of records with 23 keypoints, or its COCO file, told apart by content.
+// - "coco": any other COCO keypoints, described by a topology file (AP-10K, AnimalPose, a lab's own).
+// - "deeplabcut": DeepLabCut's .h5 and .csv, labels and predictions; `annotations` is one of these files, or
+//   the folder of a project with its CollectedData files.
 std::vector<std::string> dataset_formats();
 
-// Sample ids are name/split/picture#annotation; the annotation is its id where the file gives distinct ones,
-// else its index.
+// Loads a dataset. Sample ids are name/split/picture#annotation. The annotation is its id if all ids in the
+// file are distinct, else its index.
 //
-// Throws std::invalid_argument for options that make no sense, and std::runtime_error naming file, place, got
-// and expected when the file as a whole cannot be read (absent, cut short, wrong top-level type, keypoint
-// names of another dataset). A bad record is returned with its failure instead.
+// Throws std::invalid_argument for options that make no sense. Throws std::runtime_error that names the file
+// and the place, what was found and what was expected, if the file as a whole cannot be read (absent, cut
+// short, wrong top-level type, keypoint names of another dataset). A bad record does not throw; it is
+// returned with its failure.
 Dataset load_dataset(const DatasetOptions& options);
 
 }  // namespace q3d::loaders::formats

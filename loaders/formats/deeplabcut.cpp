@@ -60,7 +60,7 @@ std::vector<PointColumns> in_order(const FoundColumns& found, const keypoints::T
     const auto y = columns.find("y");
     const auto likelihood = columns.find("likelihood");
     if (x == columns.end() || y == columns.end()) {
-      throw std::runtime_error(fmt::format("{}: {}: expected both x and y", where, bodypart));
+      throw std::runtime_error(fmt::format("{}: {}: expected a column x and a column y", where, bodypart));
     }
     points.push_back({x->second, y->second, {}});
     if (likelihood != columns.end()) points.back().likelihood = likelihood->second;
@@ -75,22 +75,23 @@ std::vector<Individual> individuals_of(const LabelTable& table, const keypoints:
   for (std::size_t i = 0; i < table.columns.size(); ++i) {
     const LabelColumn& column = table.columns[i];
     if (column.scorer != table.columns[0].scorer) {
-      throw std::runtime_error(fmt::format("{}: scorer: got both \"{}\" and \"{}\", expected one a file",
-                                           file.string(), table.columns[0].scorer, column.scorer));
+      throw std::runtime_error(
+          fmt::format("{}: scorer: got both \"{}\" and \"{}\", expected one scorer in a file", file.string(),
+                      table.columns[0].scorer, column.scorer));
     }
     if (found.count(column.individual) == 0) names.push_back(column.individual);
     FoundColumns& here = found[column.individual];
     auto& coordinates = here.of_bodypart[column.bodypart];
     if (coordinates.empty()) here.bodyparts.push_back(column.bodypart);
     if (!coordinates.emplace(column.coordinate, i).second) {
-      throw std::runtime_error(fmt::format("{}: {} of {} {} stands in two columns", file.string(),
+      throw std::runtime_error(fmt::format("{}: {} of {} {} occurs in two columns", file.string(),
                                            column.coordinate, column.individual, column.bodypart));
     }
   }
   std::vector<Individual> individuals;
   for (const std::string& name : names) {
     if (name == kNoAnimal && names.size() > 1) {
-      notes.add(fmt::format("{}: keypoints of no animal (individual \"{}\") are left out: {}",
+      notes.add(fmt::format("{}: keypoints that belong to no animal (individual \"{}\") are left out: {}",
                             file.filename().string(), name, found[name].bodyparts.size()));
       continue;
     }
@@ -163,10 +164,12 @@ class DeepLabCutLoader {
     for (const fs::path& file : files) read_file(file);
     name_samples();
     if (absent_ > 0)
-      loading_.notes.add(fmt::format("individuals without a keypoint in a frame: {}", absent_));
+      loading_.notes.add(
+          fmt::format("individuals that have no keypoint in a frame and are left out there: {}", absent_));
     if (const std::string note = weights_.note(); !note.empty()) loading_.notes.add(note);
     if (loading_.options.species.empty()) {
-      loading_.notes.add("DeepLabCut's files name no species; the key \"species\" does");
+      loading_.notes.add(
+          "DeepLabCut's files state no species; set the key \"species\" of the dataset to give one");
     }
     return finished(loading_, std::move(records_));
   }
@@ -188,7 +191,7 @@ class DeepLabCutLoader {
     }
     if (!found.empty()) return {found.begin(), found.end()};
     throw std::runtime_error(fmt::format(
-        "{}: got a folder without labels, expected DeepLabCut's CollectedData_*.h5 or .csv below it",
+        "{}: got a folder without labels, expected DeepLabCut's CollectedData_*.h5 or .csv in or below it",
         given.string()));
   }
 
@@ -198,9 +201,10 @@ class DeepLabCutLoader {
     std::optional<NumberedPictures> numbered;
     if (table.rows_are_numbers && !table.rows.empty()) {
       numbered.emplace(loading_.options.root / loading_.options.images);
-      loading_.notes.add(fmt::format(
-          "{}: rows are frame numbers; the picture of each is the one in \"images\" whose name ends in it",
-          file.filename().string()));
+      loading_.notes.add(
+          fmt::format("{}: the rows are frame numbers; each row takes the picture in \"images\" whose name "
+                      "ends in its number",
+                      file.filename().string()));
     }
     for (std::size_t row = 0; row < table.rows.size(); ++row) {
       const std::string picture = numbered ? numbered->name_of(table.rows[row]) : table.rows[row];
@@ -244,7 +248,8 @@ class DeepLabCutLoader {
     std::set<std::string> ids;
     for (const SampleRecord& record : records_) ids.insert(record.id);
     if (ids.size() == records_.size()) return;
-    loading_.notes.add("a picture stands in several rows; samples are numbered in the order of the rows");
+    loading_.notes.add(
+        "a picture occurs in several rows, so the ids number the samples in the order of the rows");
     for (std::size_t i = 0; i < records_.size(); ++i) {
       std::string& id = records_[i].id;
       id.replace(id.size() - annotations_[i].size(), annotations_[i].size(), std::to_string(i));

@@ -50,9 +50,9 @@ struct StoredDataset {
 // A link could lead to another file.
 void require_own(hid_t parent, const std::string& name, const std::string& where) {
   H5L_info_t link{};
-  if (H5Lexists(parent, name.c_str(), H5P_DEFAULT) <= 0) refuse(where, "nothing", "it");
+  if (H5Lexists(parent, name.c_str(), H5P_DEFAULT) <= 0) refuse(where, "nothing", "an object of this name");
   check(H5Lget_info(parent, name.c_str(), &link, H5P_DEFAULT), where);
-  if (link.type != H5L_TYPE_HARD) refuse(where, "a link to elsewhere", "the file's own");
+  if (link.type != H5L_TYPE_HARD) refuse(where, "a link to another place", "an object of this file");
 }
 
 class PandasGroup {
@@ -121,12 +121,13 @@ StoredDataset PandasGroup::open(const std::string& member, std::size_t rank) con
   H5O_info_t object{};
   require_own(id(), member, where);
   check(H5Oget_info_by_name(id(), member.c_str(), &object, H5P_DEFAULT), where);
-  if (object.type != H5O_TYPE_DATASET) refuse(where, "another object", "a dataset");
+  if (object.type != H5O_TYPE_DATASET) refuse(where, "an object of another kind", "a dataset");
   Handle dataset(H5Dopen2(id(), member.c_str(), H5P_DEFAULT), H5Dclose, where);
   Handle type(H5Dget_type(dataset.get()), H5Tclose, where);
   const Handle space(H5Dget_space(dataset.get()), H5Sclose, where);
   const Handle creation(H5Dget_create_plist(dataset.get()), H5Pclose, where);
-  if (H5Pget_external_count(creation.get()) != 0) refuse(where, "bytes of another file", "its own");
+  if (H5Pget_external_count(creation.get()) != 0)
+    refuse(where, "a dataset whose bytes lie in another file", "one whose bytes lie in this file");
   const int dimensions = check(H5Sget_simple_extent_ndims(space.get()), where);
   if (static_cast<std::size_t>(dimensions) != rank) {
     refuse(where, fmt::format("{} dimensions", dimensions), std::to_string(rank));
@@ -148,7 +149,7 @@ void PandasGroup::check_size(const StoredDataset& dataset, const std::string& me
     refuse(path(member),
            fmt::format("a claim of {} bytes in a file of {}", overflows ? "2^64" : std::to_string(bytes),
                        file_bytes_),
-           "what the file can hold");
+           "at most what such a file can hold");
   }
 }
 
@@ -218,7 +219,7 @@ void set_columns(std::vector<std::vector<std::string>> names, const PandasGroup&
 void read_fixed(const PandasGroup& group, LabelTable& table) {
   if (const std::int64_t blocks = group.integer_attribute("nblocks"); blocks != 1) {
     refuse(group.path("nblocks"), std::to_string(blocks),
-           "1: columns of one number type; save the table as CSV instead");
+           "1, because all columns must have one number type; save the table as CSV instead");
   }
   set_columns(group.multi_index("block0_items"), group, table);
   if (group.text_attribute("axis1_variety") == "multi") {
@@ -254,7 +255,7 @@ TableRow table_row(const PandasGroup& group, const StoredDataset& table, std::si
   if (H5Tget_class(table.type.get()) != H5T_COMPOUND || H5Tget_nmembers(table.type.get()) != 2 ||
       H5Tget_member_index(table.type.get(), "index") != 0 ||
       H5Tget_member_index(table.type.get(), "values_block_0") != 1) {
-    refuse(where, "other fields", "index and values_block_0: columns of one number type");
+    refuse(where, "other fields", "index and values_block_0, because all columns must have one number type");
   }
   const Handle index(H5Tget_member_type(table.type.get(), 0), H5Tclose, where);
   const Handle block(H5Tget_member_type(table.type.get(), 1), H5Tclose, where);
@@ -262,7 +263,7 @@ TableRow table_row(const PandasGroup& group, const StoredDataset& table, std::si
   if (H5Tget_class(block.get()) != H5T_ARRAY || H5Tget_array_ndims(block.get()) != 1 ||
       H5Tget_array_dims2(block.get(), &width) < 0 || width != columns) {
     refuse(where + ".values_block_0", fmt::format("another type, or {} numbers", width),
-           fmt::format("{} numbers a row, one for each column name", columns));
+           fmt::format("{} numbers in a row, one for each column name", columns));
   }
   const Handle element(H5Tget_super(block.get()), H5Tclose, where);
   if (H5Tget_class(element.get()) != H5T_FLOAT) refuse(where + ".values_block_0", "another type", "floats");
@@ -283,7 +284,7 @@ void read_rows(const PandasGroup& group, LabelTable& table) {
   set_columns(read_pickled_columns(group.text_attribute("non_index_axes"), group.path("non_index_axes")),
               group, table);
   const std::size_t columns = table.columns.size();
-  if (columns == 0) refuse(group.path("non_index_axes"), "no columns", "some");
+  if (columns == 0) refuse(group.path("non_index_axes"), "no columns", "at least one");
   const StoredDataset stored = group.open("table", 1);
   const TableRow row = table_row(group, stored, columns);
   const std::size_t row_bytes = row.index_bytes + columns * sizeof(double);

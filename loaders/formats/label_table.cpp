@@ -18,7 +18,7 @@ bool is_hdf5(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   if (!std::filesystem::is_regular_file(file) || !stream) {
     throw std::runtime_error(
-        fmt::format("{}: got nothing that can be read, expected DeepLabCut's .h5 or .csv", file.string()));
+        fmt::format("{}: got a file that cannot be read, expected DeepLabCut's .h5 or .csv", file.string()));
   }
   stream.read(start.data(), start.size());
   return stream && std::string_view(start.data(), start.size()) == kSignature;
@@ -32,9 +32,8 @@ LabelColumn label_column(std::vector<std::string> names, const std::string& wher
   constexpr std::array<std::string_view, 3> kCoordinates{"x", "y", "likelihood"};
   if (names.size() != 3 && names.size() != 4) {
     throw std::runtime_error(
-        fmt::format("{}: got {} levels of column names ({}), expected scorer, bodyparts, coords, with "
-                    "individuals between "
-                    "the first two or without",
+        fmt::format("{}: got {} levels of column names ({}), expected scorer, bodyparts, coords or "
+                    "scorer, individuals, bodyparts, coords",
                     where, names.size(), fmt::join(names, ", ")));
   }
   LabelColumn column;

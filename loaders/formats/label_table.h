@@ -1,5 +1,5 @@
-// DeepLabCut's tables: one row a frame, one column a coordinate of a keypoint (of an individual). It writes
-// each as CSV and as a pandas DataFrame in HDF5.
+// DeepLabCut's tables have one row for each frame and one column for each coordinate of a keypoint (of an
+// individual). DeepLabCut writes each table as CSV and as a pandas DataFrame in HDF5.
 #pragma once
 
 #include <cstddef>
@@ -9,7 +9,7 @@
 
 namespace q3d::loaders::formats {
 
-// What a column holds.
+// The meaning of a column.
 struct LabelColumn {
   std::string scorer;
   std::string individual;  // empty in tables of one animal
@@ -19,7 +19,8 @@ struct LabelColumn {
 
 struct LabelTable {
   std::vector<LabelColumn> columns;
-  // A picture's name with its folders, however many parts the file keeps it in; or a frame's number.
+  // The name of each row: a picture's name with its folders, which the file may keep in several parts, or the
+  // number of a frame.
   std::vector<std::string> rows;
   bool rows_are_numbers = false;
   std::vector<double> values;  // (rows, columns), px; NaN where nothing was labelled
@@ -27,22 +28,25 @@ struct LabelTable {
   double at(std::size_t row, std::size_t column) const { return values[row * columns.size() + column]; }
 };
 
-// By content: HDF5 or CSV. Throws std::runtime_error naming file, place, got and expected.
+// Reads a table, HDF5 or CSV, recognised by content. Throws std::runtime_error that names file and place,
+// what was found and what was expected.
 LabelTable read_label_table(const std::filesystem::path& file);
 bool is_hdf5(const std::filesystem::path& file);
 
-// The two by themselves. HDF5 is read in a process of its own: a damaged file can crash that library.
+// These read one of the two forms. HDF5 is read in a separate process, because a damaged file can crash that
+// library.
 LabelTable read_label_csv(const std::filesystem::path& file);
 LabelTable read_label_hdf5(const std::filesystem::path& file);
 
-// In this process, for fuzzing, which sees no other.
+// Reads HDF5 in this process, for fuzzing, which cannot see another process.
 LabelTable read_label_hdf5_here(const std::filesystem::path& file);
 
-// The names of a column, scorer first, as the file's levels give them: three, or four with individuals.
-// Throws std::runtime_error for another number of them, naming `where`.
+// Makes a column of its names, scorer first, as the file's levels give them: three, or four with individuals.
+// Throws std::runtime_error that names `where` for another number of names.
 LabelColumn label_column(std::vector<std::string> names, const std::string& where);
 
-// "labeled-data", "walk", "img1.png" -> "labeled-data/walk/img1.png"; Windows' separators become '/'.
+// Joins the parts of a row's name: "labeled-data", "walk", "img1.png" -> "labeled-data/walk/img1.png".
+// Windows' separators become '/'.
 std::string row_name(const std::vector<std::string>& parts);
 
 }  // namespace q3d::loaders::formats

@@ -1,4 +1,5 @@
-// Remarks about a dataset, each told once with how many records it concerns and which was the first.
+// Remarks about a dataset. Each is reported once, with the number of records it concerns and the first of
+// them.
 #pragma once
 
 #include <algorithm>
@@ -23,7 +24,7 @@ class Notes {
     }
   }
 
-  // In the order of their first occurrence, the counted ones last.
+  // Returns the notes in the order of their first occurrence. Those that count records come last.
   std::vector<std::string> list() const {
     std::vector<std::string> all = plain_;
     for (const Counted& each : counted_) {

@@ -92,13 +92,13 @@ std::string in_own_process(const std::function<std::string()>& work, std::chrono
   if (WIFSIGNALED(status)) {
     throw std::runtime_error(
         WTERMSIG(status) == SIGALRM
-            ? fmt::format("not read after {} s, which ended the attempt", limit.count())
-            : fmt::format("the library that reads it crashed ({}), as it does on damaged files",
+            ? fmt::format("reading took more than {} s and was stopped", limit.count())
+            : fmt::format("the library that reads it crashed ({}), which happens with damaged files",
                           strsignal(WTERMSIG(status))));
   }
   if (!WIFEXITED(status) || WEXITSTATUS(status) != EXIT_SUCCESS || answer.empty()) {
-    throw std::runtime_error(
-        fmt::format("the process that reads it ended with status {} and no answer", WEXITSTATUS(status)));
+    throw std::runtime_error(fmt::format("the process that reads it ended with status {} and gave no answer",
+                                         WEXITSTATUS(status)));
   }
   const bool is_value = answer.front() == kValue;
   answer.erase(0, 1);

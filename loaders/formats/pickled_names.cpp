@@ -102,13 +102,13 @@ class Unpickler {
   }
 
   char next() {
-    if (at_ >= pickle_.size()) fail("its end", "more");
+    if (at_ >= pickle_.size()) fail("its end", "more bytes");
     return pickle_[at_++];
   }
 
   std::string_view line() {
     const std::size_t end = pickle_.find('\n', at_);
-    if (end == std::string_view::npos) fail("its end", "a line's end");
+    if (end == std::string_view::npos) fail("its end", "the end of a line");
     const std::size_t start = std::exchange(at_, end + 1);
     return pickle_.substr(start, end - start);
   }
@@ -130,7 +130,7 @@ class Unpickler {
   std::vector<Value> pop_to_mark() {
     std::size_t first = stack_.size();
     while (first > 0 && !std::holds_alternative<Mark>(stack_[first - 1].content)) --first;
-    if (first == 0) fail("no mark on the stack", "one");
+    if (first == 0) fail("no mark on the stack", "a mark");
     std::vector<Value> items(stack_.begin() + static_cast<std::ptrdiff_t>(first), stack_.end());
     stack_.resize(first - 1);
     return items;
@@ -139,7 +139,7 @@ class Unpickler {
   void append() {
     const Value item = pop();
     const auto* list = std::get_if<Items>(&top().content);
-    if (list == nullptr) fail("no list", "one to append to");
+    if (list == nullptr) fail("no list", "a list to append to");
     put_into(**list, item);
   }
 
@@ -154,8 +154,11 @@ class Unpickler {
       (*inner)->is_within = true;
       list.depth = std::max(list.depth, (*inner)->depth + 1);
     }
-    if (list.is_within) fail("more for a list that lies in another", "lists that are complete before");
-    if (list.depth > kDeepest) fail("deeper lists", fmt::format("at most {} within each other", kDeepest));
+    if (list.is_within)
+      fail("an item for a list that is already part of another",
+           "lists that are complete before they are nested");
+    if (list.depth > kDeepest)
+      fail("lists that are nested too deeply", fmt::format("at most {} levels", kDeepest));
     list.items.push_back(item);
   }
 
@@ -169,7 +172,7 @@ class Unpickler {
 
   const Value& recall(std::int64_t key) const {
     const auto found = memo_.find(key);
-    if (found == memo_.end()) fail(fmt::format("the memo {}", key), "one that was put before");
+    if (found == memo_.end()) fail(fmt::format("the memo {}", key), "one that was stored before");
     return found->second;
   }
 
@@ -181,10 +184,11 @@ class Unpickler {
       const char kind = i + 1 < line.size() ? line[i + 1] : '\0';
       if (code == '\\' && (kind == 'u' || kind == 'U')) {
         const std::size_t digits = kind == 'u' ? 4 : 8;
-        if (line.size() - i - 2 < digits) fail("a cut escape", "its digits");
+        if (line.size() - i - 2 < digits) fail("an incomplete escape sequence", "all of its digits");
         const char* start = line.data() + i + 2;
         const auto [end, error] = std::from_chars(start, start + digits, code, 16);
-        if (error != std::errc() || end != start + digits || code > 0x10FFFF) fail("an escape", "hex digits");
+        if (error != std::errc() || end != start + digits || code > 0x10FFFF)
+          fail("a wrong escape sequence", "hex digits of a character");
         i += 1 + digits;
       }
       append_utf8(text, code);
@@ -206,7 +210,7 @@ std::vector<std::vector<std::string>> read_pickled_columns(std::string_view pick
   const auto refuse = [&]() -> std::runtime_error {
     return std::runtime_error(
         fmt::format("{}: got a pickle of another form, expected a list of tuples of column names, "
-                    "at most {} names a tuple and {} bytes a name",
+                    "at most {} names in a tuple and {} bytes in a name",
                     where, kMaxNames, kMaxNameBytes));
   };
   const auto items_of = [&](const Value& value) -> const std::vector<Value>& {

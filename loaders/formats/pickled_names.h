@@ -1,4 +1,4 @@
-// The column names of a pandas table, which PyTables keeps as a pickle in an attribute.
+// Reads the column names of a pandas table, which PyTables keeps as a pickle in an attribute.
 #pragma once
 
 #include <string>
@@ -7,11 +7,12 @@
 
 namespace q3d::loaders::formats {
 
-// From the pickle of `[(1, [("scorer", "snout", "x"), ...])]` (attribute non_index_axes): the inner list.
+// Returns the inner list of the pickle of `[(1, [("scorer", "snout", "x"), ...])]` (attribute
+// non_index_axes).
 //
 // The pickle is read as data: a stack of lists, tuples, texts and whole numbers in the text protocol (0),
-// which is what PyTables writes. Whatever could name or call code is refused. Throws std::runtime_error
-// naming `where`, the byte, got and expected.
+// which PyTables writes. Anything that could name or call code is refused. Throws std::runtime_error that
+// names `where` and the byte, what was found and what was expected.
 std::vector<std::vector<std::string>> read_pickled_columns(std::string_view pickle, const std::string& where);
 
 }  // namespace q3d::loaders::formats

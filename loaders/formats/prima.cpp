@@ -42,7 +42,7 @@ void read_betas(const nlohmann::json& record, RecordReader& reader, Loading& loa
   if (reader.has("shape_extra")) {
     copy_into(truth.betas, reader.finite_numbers("shape_extra", kBetas - kFirstBetas, 1), kFirstBetas);
   } else {
-    loading.notes.count("shape has 20 numbers and there is no shape_extra (the other 21 betas are 0)", id);
+    loading.notes.count("shape has 20 numbers and shape_extra is missing, so the other 21 betas are 0", id);
   }
 }
 
@@ -86,11 +86,11 @@ void set_mask(RecordReader& reader, Loading& loading, SampleRecord& sample) {
   if (name.empty() || reader.failed()) return;
   FoundPicture mask = loading.finder.find(name);
   if (mask.failure == Reason::none && mask.path == sample.image_path) {
-    loading.notes.count("mask_path names the picture itself (no mask)", sample.id);
+    loading.notes.count("mask_path names the picture itself, so the sample has no mask", sample.id);
   } else if (mask.failure == Reason::none) {
     sample.mask_path = mask.path.string();
   } else if (mask.failure == Reason::image_missing) {
-    loading.notes.count("mask_path names a file that is not there (no mask)", sample.id);
+    loading.notes.count("mask_path names a file that does not exist, so the sample has no mask", sample.id);
   } else {
     reader.fail(mask.failure, "mask_path", mask.got, "a mask below the dataset's root");
   }

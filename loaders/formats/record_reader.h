@@ -1,4 +1,4 @@
-// Reading the records of an annotation file, each of which may be bad without harm to the others.
+// Reads the records of an annotation file. A bad record does not affect the others.
 #pragma once
 
 #include <cstdint>
@@ -13,42 +13,44 @@
 
 namespace q3d::loaders::formats {
 
-// Reads the fields of one record. The first thing found wrong becomes the sample's failure, with file, index,
-// field, got and expected; reading then goes on and returns something harmless, so that parsers need no
-// exits.
+// Reads the fields of one record. The first problem becomes the sample's failure, with file, index and field,
+// what was found and what was expected. Reading then continues and returns harmless values, so that parsers
+// need no early exits.
 class RecordReader {
  public:
-  // `where` names file and index, e.g. "train.json: data[12]". All three outlive the reader.
+  // `where` names file and index, for example "train.json: data[12]". The record and the sample must outlive
+  // the reader.
   RecordReader(const nlohmann::json& record, std::string where, manifests::SampleRecord& sample);
 
-  bool has(const std::string& field) const;  // there, and not null
+  bool has(const std::string& field) const;  // true if the field exists and is not null
   bool failed() const { return sample_.failure != manifests::Reason::none; }
   void fail(manifests::Reason reason, std::string_view field, std::string_view got,
             std::string_view expected);
 
   std::string text(const std::string& field);              // required
-  std::string optional_text(const std::string& field);     // "" when it is not there
-  std::optional<double> number(const std::string& field);  // nothing when it is not there; NaN if not finite
-  std::optional<std::int64_t> integer(const std::string& field);  // nothing when it is not there
-  // Pixels of the image's size; 0 when it is not there.
+  std::string optional_text(const std::string& field);     // "" if it is absent
+  std::optional<double> number(const std::string& field);  // nothing if it is absent; NaN if it is not finite
+  std::optional<std::int64_t> integer(const std::string& field);  // nothing if it is absent
+  // Returns a size of the image in pixels; 0 if it is absent.
   int size_px(const std::string& field);
 
-  // `rows` x `columns` numbers, nested or flat; what is null or not finite is NaN. Empty when the field is
-  // not there or of another shape, which fails with `missing` or `wrong_length`.
+  // Returns `rows` x `columns` numbers, which may be nested or flat. A number that is null or not finite is
+  // NaN. If the field is absent or has another shape, the result is empty and the record fails with `missing`
+  // or `wrong_length`.
   std::vector<double> numbers(const std::string& field, std::size_t rows, std::size_t columns,
                               manifests::Reason missing, manifests::Reason wrong_length);
-  // The same for a field that must be there in full, each number finite in float32.
+  // The same for a field that must be complete and have only numbers that are finite in float32.
   std::vector<double> finite_numbers(const std::string& field, std::size_t rows, std::size_t columns);
 
-  // x, y, v of `count` keypoints. Weight is 1 where v > 0, else 0; unlabelled points may have any
+  // Returns x, y, v of `count` keypoints. The weight is 1 if v > 0, else 0. Unlabelled points may have any
   // coordinates.
   std::vector<manifests::Keypoint> keypoints(const std::string& field, std::size_t count);
-  // Four numbers as they stand, the last two as width and height.
+  // Returns four numbers as they stand, the last two as width and height.
   manifests::Box box(const std::string& field);
 
  private:
   const nlohmann::json* find(const std::string& field) const;
-  // `path` names the value; it is asked only when the value is no number.
+  // `path` names the value. It is called only if the value is not a number.
   bool append(const nlohmann::json& value, const std::function<std::string()>& path,
               std::vector<double>& numbers);
 
@@ -57,10 +59,10 @@ class RecordReader {
   manifests::SampleRecord& sample_;
 };
 
-// A labelled keypoint must lie within this many pixels of the origin; what is farther is not a coordinate.
+// A labelled keypoint must lie within this many pixels of the origin. A larger number is not a coordinate.
 inline constexpr double kMaxCoordinatePx = 1e6;
 
-// x, y, v -> keypoint. False when it is labelled (v > 0) and not at a coordinate.
+// Makes a keypoint of x, y, v. Returns false if it is labelled (v > 0) but x, y is not a coordinate.
 bool set_keypoint(double x_px, double y_px, double v, manifests::Keypoint& keypoint);
 
 }  // namespace q3d::loaders::formats

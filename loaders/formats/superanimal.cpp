@@ -25,8 +25,10 @@ bool has_neck_at_the_shoulders(std::string_view source) {
 void add_species(Loading& loading, RecordReader&, SampleRecord& sample) {
   if (has_neck_at_the_shoulders(sample.source) && sample.keypoints[kNeck].weight > 0.0F) {
     sample.keypoints[kNeck].weight = 0.0F;
-    loading.notes.count(fmt::format("source {} has its neck at the shoulders (weight 0)", sample.source),
-                        sample.id);
+    loading.notes.count(
+        fmt::format("source {} labels the neck at the shoulders, so this keypoint gets weight 0",
+                    sample.source),
+        sample.id);
   }
   sample.species = species::species_of_picture(sample.image_ref, sample.source);
   set_family(loading, std::nullopt, species::family_of_species(sample.species), sample);

@@ -17,8 +17,8 @@ void ConfidenceWeights::apply(std::span<manifests::Keypoint> keypoints) {
 std::string ConfidenceWeights::note() const {
   if (confidences_ == 0) return {};
   return fmt::format(
-      "keypoints whose v is a confidence, taken as their weight: {}; of these below "
-      "min_confidence {} (weight 0): {}",
+      "keypoints whose v is a confidence, which becomes their weight: {}; of these, below min_confidence {} "
+      "(weight 0): {}",
       confidences_, min_confidence_, below_);
 }
 

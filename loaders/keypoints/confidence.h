@@ -1,4 +1,4 @@
-// Confidences that pose estimators write in the place of v.
+// Confidences, which pose estimators write in the place of v.
 #pragma once
 
 #include <cstddef>
@@ -11,15 +11,15 @@ namespace q3d::loaders::keypoints {
 
 class ConfidenceWeights {
  public:
-  // Keypoints of less confidence than `min_confidence` get weight 0: the reprojection error counts every
-  // visible keypoint alike, so a guess must not be visible.
+  // Keypoints with a confidence below `min_confidence` get weight 0. The reprojection error counts all
+  // visible keypoints alike, so a guess must not be visible.
   explicit ConfidenceWeights(double min_confidence) : min_confidence_(min_confidence) {}
 
-  // A labelled v below 1 is a confidence and becomes the weight; 1 and 2 are labels made by hand and keep
-  // weight 1. v stays as it is.
+  // If a labelled v is below 1, it is a confidence and becomes the weight. 1 and 2 are labels made by hand
+  // and keep weight 1. v itself does not change.
   void apply(std::span<manifests::Keypoint> keypoints);
 
-  // For people: how many there were; empty when there were none.
+  // Returns a note for people that says how many confidences there were; empty if there were none.
   std::string note() const;
 
  private:

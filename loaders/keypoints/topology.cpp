@@ -138,16 +138,17 @@ std::vector<int> order_in_file(const Topology& topology, std::span<const std::st
     if (found == topology.keypoints.end() || order[place] >= 0) {
       throw std::invalid_argument(fmt::format(
           "keypoint {} is named \"{}\", which {} {}", k, names_in_file[k],
-          found == topology.keypoints.end() ? "is none of" : "stands twice among the", topology.name));
+          found == topology.keypoints.end() ? "is not in the topology" : "occurs twice among the names of",
+          topology.name));
     }
     order[place] = static_cast<int>(k);
   }
   const auto missing = std::find(order.begin(), order.end(), -1);
   if (missing != order.end()) {
-    throw std::invalid_argument(
-        fmt::format("got {} keypoint names without \"{}\", expected the {} of {}", names_in_file.size(),
-                    topology.keypoints[static_cast<std::size_t>(missing - order.begin())],
-                    topology.keypoints.size(), topology.name));
+    throw std::invalid_argument(fmt::format(
+        "got {} keypoint names without \"{}\", expected the {} names of the topology {}",
+        names_in_file.size(), topology.keypoints[static_cast<std::size_t>(missing - order.begin())],
+        topology.keypoints.size(), topology.name));
   }
   return order;
 }

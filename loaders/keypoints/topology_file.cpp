@@ -51,8 +51,7 @@ class Reader {
 
   const json& member(const char* key) const {
     const auto found = document_.find(key);
-    if (found == document_.end())
-      fail(key, "nothing", "it; loaders/keypoints/topology_file.h shows a whole file");
+    if (found == document_.end()) fail(key, "nothing", "this key; docs/own-labels.md shows a whole file");
     return *found;
   }
 
@@ -68,7 +67,7 @@ class Reader {
     const std::string name = text(value, key);
     const auto& names = topology_.keypoints;
     const auto found = std::find(names.begin(), names.end(), name);
-    if (found == names.end()) fail(key, fmt::format("\"{}\"", name), "one of \"keypoints\"");
+    if (found == names.end()) fail(key, fmt::format("\"{}\"", name), "a name of \"keypoints\"");
     return static_cast<int>(found - names.begin());
   }
 
@@ -148,11 +147,12 @@ class Reader {
         return at < 0 ? std::string("nothing")
                       : fmt::format("\"{}\"", topology_.keypoints[static_cast<std::size_t>(at)]);
       };
-      fail(
-          "animal3d26",
-          fmt::format("{} from {} and {} from {}", animal3d.keypoints[i], name(here),
-                      animal3d.keypoints[mirror], name(there)),
-          "two keypoints that are a pair of \"flip_pairs\", or one that is its own mirror image, or neither");
+      fail("animal3d26",
+           fmt::format("{} from {} and {} from {}", animal3d.keypoints[i], name(here),
+                       animal3d.keypoints[mirror], name(there)),
+           "two keypoints that form a pair of \"flip_pairs\", one keypoint that is its own mirror image, or "
+           "none for "
+           "both");
     }
   }
 

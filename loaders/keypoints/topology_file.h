@@ -1,4 +1,4 @@
-// Topologies that come from a file, so that a lab's own keypoints load without new code.
+// Reads topologies from files, so that a lab's own keypoints load without new code.
 //
 //   {
 //     "name": "ap10k17",
@@ -9,9 +9,10 @@
 //     "weights": { "neck": 0 }
 //   }
 //
-// "keypoints" are in the order of the annotation files; "flip_pairs" are mirror images, and what is in none
-// is its own; "animal3d26" gives, for each of the 26 that has one, the keypoint it is taken from; "weights"
-// are factors in [0, 1] on a keypoint's weight, 1 for the others. "about" and "weights" may be left out.
+// "keypoints" are in the order of the annotation files. "flip_pairs" are mirror images of each other; a
+// keypoint in no pair is its own mirror image. "animal3d26" gives the source of each of the 26 that has one.
+// "weights" are factors in [0, 1] on a keypoint's weight; the default is 1. "about" and "weights" are
+// optional.
 #pragma once
 
 #include <filesystem>
@@ -20,8 +21,9 @@
 
 namespace q3d::loaders::keypoints {
 
-// Throws std::runtime_error naming file, key, got and expected: for unknown keys and names, names that occur
-// twice, and a map that takes a left keypoint and its mirror image from two that are not each other's.
+// Reads a topology. Throws std::runtime_error that names file and key, what was found and what was expected:
+// for unknown keys and names, for names that occur twice, and for a map in which a left keypoint and its
+// mirror image come from two keypoints that are not mirror images of each other.
 Topology read_topology_file(const std::filesystem::path& file);
 
 }  // namespace q3d::loaders::keypoints

@@ -14,10 +14,10 @@ struct Point {
 
 Point map_point(const Affine& affine, Point point);
 
-// `second` after `first`.
+// Returns the map that applies `first` and then `second`.
 Affine compose(const Affine& second, const Affine& first);
 
-// Throws std::invalid_argument when the map has no inverse.
+// Returns the inverse map. Throws std::invalid_argument if there is none.
 Affine invert(const Affine& affine);
 
 }  // namespace q3d::loaders::pictures

@@ -1,8 +1,8 @@
-// Training augmentation: what is drawn, and what it does to boxes, 3D keypoints and the global orientation.
+// Training augmentation: how it is drawn, and its effect on boxes, 3D keypoints and the global orientation.
 //
-// Official code: do_augmentation and get_example. Its mirror flip and its extreme crop crash there and are
-// off in every released configuration. The extreme crop is not offered here; the mirror is our own
-// (loaders/keypoints/mirror.h) and off by default.
+// Official code: do_augmentation and get_example. In that code, the mirror flip and the extreme crop crash
+// and are off in every released configuration. This file does not offer the extreme crop. The mirror is our
+// own (loaders/mirror.h) and off by default.
 #pragma once
 
 #include <array>
@@ -17,35 +17,36 @@ struct AugmentOptions {        // the official configuration's values
   double scale = 0.3;          // box side times 1 +- this
   double rotation_deg = 30.0;  // standard deviation, cut at two of them
   double rotation_rate = 0.6;  // share of samples that are rotated
-  double shift = 0.02;         // of the box side, each axis
+  double shift = 0.02;         // share of the box side, for each axis
   double colour = 0.2;         // each channel times 1 +- this
-  double mirror_rate = 0.0;    // share of samples that are turned over, left for right
+  double mirror_rate = 0.0;    // share of samples that are mirrored left to right
 };
 
 struct Augmentation {
   double scale = 1.0;         // > 1 shows more of the surroundings
-  double rotation_deg = 0.0;  // of the box in the image; the patch's content turns the other way
-  double shift_x = 0.0;       // of the unscaled box side
+  double rotation_deg = 0.0;  // rotation of the box in the image; the patch's content turns the other way
+  double shift_x = 0.0;       // as a share of the unscaled box side
   double shift_y = 0.0;
   std::array<double, 3> colour{1.0, 1.0, 1.0};  // R, G, B; for normalise_patch
-  bool mirror = false;                          // of the patch, after all else
+  bool mirror = false;                          // the patch is mirrored, after everything else
 };
 
-// The official distributions: normal numbers cut at +-1 for shift and scale, at +-2 for rotation, uniform
-// colour. The sequence depends on the engine's state alone, not on the standard library's distributions.
+// Draws from the official distributions: normal numbers cut at +-1 for shift and scale and at +-2 for
+// rotation, and uniform colour. The sequence depends only on the state of the engine, not on the
+// distributions of the standard library.
 Augmentation draw_augmentation(const AugmentOptions& options, std::mt19937_64& engine);
 
-// Image px -> patch px under an augmentation; feed it to warp_patch and keypoints_to_crop. A mirrored patch
-// is turned over about the crop camera's principal point, px 128.
+// Returns the map from image px to patch px under an augmentation, for warp_patch and keypoints_to_crop. A
+// mirrored patch is mirrored about the principal point of the crop camera, px 128.
 Affine augmented_patch_from_image(const SquareBox& box, const Augmentation& augmentation);
 
-// Turns 3D keypoints (x, y, z) by -rotation_deg about the camera's z axis, in float32.
-// Official code: keypoint_3d_processing.
+// Rotates 3D keypoints (x, y, z) by -rotation_deg about the camera's z axis, in float32. Official code:
+// keypoint_3d_processing.
 std::array<float, manifests::kNumKeypoints * 3> rotate_keypoints_3d(
     const std::array<float, manifests::kNumKeypoints * 3>& keypoints, double rotation_deg);
 
-// Turns an axis-angle orientation (rad) by -rotation_deg about the camera's z axis. The result's angle lies
-// in [0, pi], also for rotation 0. Official code: rot_aa.
+// Rotates an axis-angle orientation (rad) by -rotation_deg about the camera's z axis. The angle of the result
+// lies in [0, pi], also for rotation 0. Official code: rot_aa.
 std::array<float, 3> rotate_global_orient(const std::array<float, 3>& axis_angle, double rotation_deg);
 
 }  // namespace q3d::loaders::pictures

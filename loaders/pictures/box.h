@@ -1,4 +1,4 @@
-// Boxes of annotation files: which of the two ways of writing them a file uses, and what makes one unusable.
+// Boxes of annotation files: which of two conventions a file uses, and when a box cannot be used.
 #pragma once
 
 #include <optional>
@@ -15,29 +15,31 @@ struct BoxProblem {
   std::string expected;
 };
 
-// No area, or wholly outside an image of the given size (0: unknown, not checked).
+// Returns a problem if the box has no area or lies completely outside an image of the given size (0: the size
+// is unknown and not checked).
 std::optional<BoxProblem> find_box_problem(const manifests::Box& box, int width_px, int height_px);
 
 // COCO writes x, y, width, height. Pseudo-labels of DeepLabCut's video adaptation, AnimalPose and AwA-Pose
-// write x1, y1, x2, y2 under the same name. A reading fits a record when the box ends inside the image and
-// holds all labelled keypoints; often both readings do. A record whose box fits as corners alone speaks for
-// corners; one whose box does not, or whose corners are out of order, speaks against. A file is written one
-// way, so the majority of the records that speak decides; a tie is x, y, width, height.
+// write x1, y1, x2, y2 under the same name. A reading fits a record if the box ends inside the image and
+// contains all labelled keypoints; often both readings fit. A record whose box fits only as corners is a vote
+// for corners. A record whose box fits only as x, y, width, height, or whose corners are out of order, is a
+// vote against corners. All boxes of a file are written in the same way, so the majority of the votes
+// decides; a tie means x, y, width, height.
 struct BoxVote {
-  std::size_t corners = 0;  // records that fit as x1, y1, x2, y2 alone
-  std::size_t extents = 0;  // records that fit as x, y, width, height alone
+  std::size_t corners = 0;  // records that fit only as x1, y1, x2, y2
+  std::size_t extents = 0;  // records that fit only as x, y, width, height
   bool is_corners() const { return corners > extents; }
 };
 
-// Records whose box holds the four numbers as they stand in the file. Failed records, and those without a box
-// (NaN), have no say.
+// Counts the votes of records whose box holds the four numbers as the file has them. Failed records and
+// records without a box (NaN) have no vote.
 BoxVote vote_on_boxes(std::span<const manifests::SampleRecord> records);
 
-// Around the keypoints of weight > 0, wider by `margin` times its longer side on each side. Nothing when
-// there are none.
+// Returns a box around the keypoints of weight > 0, enlarged on each side by `margin` times its longer side,
+// or nothing if there are no such keypoints.
 std::optional<manifests::Box> box_around(std::span<const manifests::Keypoint> keypoints, double margin);
 
-// (x1, y1, x2, y2) held as a box -> the box.
+// Converts corners (x1, y1, x2, y2) that are stored as a box to x, y, width, height.
 manifests::Box box_from_corners(const manifests::Box& corners);
 
 }  // namespace q3d::loaders::pictures

@@ -12,7 +12,8 @@ namespace q3d::loaders::pictures {
 
 inline constexpr int kPatchSidePx = 256;
 
-// ImageNet's, of colours in [0, 1]: what the network's pictures are normalised with.
+// Mean and standard deviation of ImageNet's colours in [0, 1]. The network's pictures are normalised with
+// them.
 inline constexpr std::array<double, 3> kImageMean{0.485, 0.456, 0.406};
 inline constexpr std::array<double, 3> kImageStd{0.229, 0.224, 0.225};
 
@@ -22,49 +23,49 @@ struct SquareBox {  // pixels of the source image
   double side_px = 0.0;
 };
 
-// Official TrainDataset: centre (2x + w) // 2, (2y + h) // 2 (floor), side max(w, h), at least 1.
+// Returns the square box of the official TrainDataset: centre (2x + w) // 2, (2y + h) // 2 (floor), side
+// max(w, h), at least 1.
 SquareBox square_box(const manifests::Box& box);
 
-// Official EvaluationDataset: the same, but the side goes through float32 as w / 200 * 200, which moves some
-// sides by their last bit (424 becomes 423.99997).
+// Returns the square box of the official EvaluationDataset. It is the same, except that the side is computed
+// in float32 as w / 200 * 200, which changes the last bit of some sides (424 becomes 423.99997).
 SquareBox evaluation_box(const manifests::Box& box);
 
-// Image px -> patch px. Official code: gen_trans_from_patch_cv (rotation in degrees).
+// Returns the map from image px to patch px. Official code: gen_trans_from_patch_cv (rotation in degrees).
 Affine patch_from_image(const SquareBox& box, int patch_side_px, double scale = 1.0,
                         double rotation_deg = 0.0);
 
-enum class Border { constant, replicate };  // what lies outside the image: black, or its edge repeated
+enum class Border { constant, replicate };  // pixels outside the image are black, or repeat its edge
 
 struct Patch {
-  cv::Mat rgb;  // 8-bit, 3 channels, kPatchSidePx square
-  cv::Mat
-      mask;  // 8-bit, 1 channel: the warped silhouette; all 255 when there is none or no pixel reaches half
+  cv::Mat rgb;   // 8-bit, 3 channels, kPatchSidePx square
+  cv::Mat mask;  // 8-bit, 1 channel: the warped silhouette; all 255 if there is none or no pixel reaches half
   bool has_mask = false;  // whether `mask` is a silhouette
   Affine from_image{};
 };
 
-// Cuts a patch with one warp. `rgb` is 8-bit RGB; `mask` 8-bit grey of the same size, or empty. Outside the
-// image the mask is 0 under either border. Official code: generate_image_patch_cv2 and the mask rule of
-// TrainDataset. Throws std::invalid_argument on other types or sizes.
+// Cuts a patch with one warp. `rgb` is 8-bit RGB; `mask` is 8-bit grey of the same size, or empty. Outside
+// the image the mask is 0 with either border. Official code: generate_image_patch_cv2 and the mask rule of
+// TrainDataset. Throws std::invalid_argument for other types or sizes.
 Patch warp_patch(const cv::Mat& rgb, const cv::Mat& mask, const Affine& from_image,
                  Border border = Border::constant);
 
-// warp_patch for a box without augmentation.
+// Calls warp_patch for a box without augmentation.
 Patch make_patch(const cv::Mat& rgb, const cv::Mat& mask, const SquareBox& box);
 
-// 8-bit, 255 where the patch is not exactly black. Official code: img_border_mask, which takes black pixels
-// inside the image for border too.
+// Returns an 8-bit picture that is 255 where the patch is not exactly black. Official code: img_border_mask,
+// which also counts black pixels inside the image as border.
 cv::Mat border_mask(const cv::Mat& patch_rgb);
 
-// (3, side, side) float32, channel by channel: (min(u8 * colour, 255) - 255 mean) / (255 std) in float32, as
-// the official code computes it under numpy 1.x. Throws std::invalid_argument when `planes` does not hold 3 *
-// side * side numbers.
+// Writes (3, side, side) float32, channel by channel: (min(u8 * colour, 255) - 255 mean) / (255 std) in
+// float32, as the official code computes it under numpy 1.x. Throws std::invalid_argument if `planes` does
+// not have 3 * side * side numbers.
 void normalise_patch(const cv::Mat& patch_rgb, const std::array<double, 3>& colour_scale,
                      std::span<float> planes);
 
-// Keypoints of the source image -> crop units [-0.5, 0.5]: affine in double, stored as float32 px,
-// / 256 - 0.5 in float32. Returns 26 x (x, y, weight); unlabelled points are carried along, so test the
-// weight.
+// Maps keypoints of the source image to crop units [-0.5, 0.5]: the affine map is computed in double, stored
+// as float32 px, and then / 256 - 0.5 is computed in float32. Returns 26 x (x, y, weight). Unlabelled points
+// are mapped too, so test the weight.
 std::array<float, manifests::kNumKeypoints * 3> keypoints_to_crop(const manifests::Keypoints& keypoints,
                                                                   const Affine& patch_from_image);
 

@@ -14,10 +14,10 @@ struct DemoCrop {
   float side_px = 0.0F;
 };
 
-// Official code: ViTDetDataset. The box is (x1, y1, x2, y2) in pixels; its centre is not floored, its side is
-// the longer one after the box was widened to `aspect` (width, height; {0, 0} leaves it), and a picture that
-// shrinks more than 2.2 times is blurred first (Gaussian, in double) and then warped without rounding to 8
-// bits. Throws std::invalid_argument on other types than 8-bit RGB or a box without area.
+// Official code: ViTDetDataset. The box is (x1, y1, x2, y2) in pixels. Its centre is not floored. Its side is
+// the longer one after the box was widened to `aspect` (width, height; {0, 0} leaves it unchanged). A picture
+// that shrinks by more than 2.2 times is blurred first (Gaussian, in double) and then warped without rounding
+// to 8 bits. Throws std::invalid_argument for types other than 8-bit RGB and for a box without area.
 DemoCrop demo_crop(const cv::Mat& rgb, const std::array<float, 4>& box_xyxy,
                    const std::array<int, 2>& aspect = {0, 0});
 

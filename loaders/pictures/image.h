@@ -1,8 +1,8 @@
-// Pictures from disk, decoded by content (never by file name) and never rotated by EXIF: annotations are in
-// the pixels as stored.
+// Reads pictures from disk. They are decoded by content, never by file name, and never rotated by EXIF,
+// because annotations refer to the pixels as stored.
 //
-// JPEG and PNG are read, which is what the datasets hold; any other content is a failure that names what was
-// found. No picture is allocated beyond kMaxPixels, whatever its header says.
+// JPEG and PNG are read, which are the formats of the datasets. Any other content is a failure that names
+// what was found. No picture larger than kMaxPixels is allocated, whatever its header says.
 #pragma once
 
 #include <cstddef>
@@ -26,7 +26,8 @@ struct FileBytes {
   std::string detail;  // for people: what was found
 };
 
-// A whole file, so that a caller can digest the very bytes that it decodes. Never throws for a bad file.
+// Reads a whole file, so that a caller can digest the very bytes that it decodes. Never throws for a bad
+// file.
 FileBytes read_picture_file(const std::filesystem::path& path);
 
 struct DecodedImage {
@@ -35,20 +36,21 @@ struct DecodedImage {
   std::string detail;
 };
 
-// Grey, palette, alpha, 16-bit and CMYK pictures become 8-bit RGB as PIL's convert('RGB') does: alpha is
-// dropped, CMYK is taken as Adobe's inverted kind. One difference: of 16-bit grey the high byte is kept,
-// where PIL clips at 255 and gives a white picture. Never throws for a bad picture.
+// Decodes a picture. Grey, palette, alpha, 16-bit and CMYK pictures become 8-bit RGB as with PIL's
+// convert('RGB'): alpha is dropped, and CMYK is read as Adobe's inverted kind. There is one difference: of
+// 16-bit grey the high byte is kept, where PIL clips at 255 and gives a white picture. Never throws for a bad
+// picture.
 DecodedImage decode_image(std::span<const std::byte> bytes);
 DecodedImage decode_image(const std::filesystem::path& path);
 
-// What a mask file turned out to be. The official code takes every file for a silhouette; converters exist
-// that name the picture itself as its mask, or write 0 and 1.
+// The kind of a mask file. The official code takes every file for a silhouette, but some converters name the
+// picture itself as its mask, or write 0 and 1.
 enum class MaskKind : std::uint8_t {
   absent,      // no mask is named
-  silhouette,  // dark and bright, as it should be
-  low_valued,  // 0 and one other value below 128: brought to 0 and 255
-  blank,       // all 0: no animal in it
-  picture,     // mid-tones: a photograph, not a mask
+  silhouette,  // has dark and bright pixels, as a mask should
+  low_valued,  // has 0 and one other value below 128; it is scaled to 0 and 255
+  blank,       // is 0 everywhere: it shows no animal
+  picture,     // has mid-tones: it is a photograph, not a mask
 };
 
 struct DecodedMask {
@@ -58,7 +60,8 @@ struct DecodedMask {
   std::string detail;
 };
 
-// Grey as PIL's convert('L'). An empty path is an absent mask; a path that cannot be read is a failure.
+// Decodes a mask. Grey values are those of PIL's convert('L'). An empty path is an absent mask; a path that
+// cannot be read is a failure.
 DecodedMask decode_mask(std::span<const std::byte> bytes);
 DecodedMask decode_mask(const std::filesystem::path& path);
 

@@ -1,5 +1,5 @@
-// JPEG decoding through libjpeg. OpenCV's reader has no way to tell that a picture ends too early (it fills
-// the rest with grey) and lets libjpeg print its warnings.
+// Decodes JPEG with libjpeg. OpenCV's reader cannot tell that a picture ends too early (it fills the rest
+// with grey), and it lets libjpeg print its warnings.
 #pragma once
 
 #include <cstddef>
@@ -11,8 +11,8 @@ namespace q3d::loaders::pictures {
 
 bool is_jpeg(std::span<const std::byte> bytes);
 
-// 8-bit RGB. A picture whose data or end marker is missing is image_truncated; harmless oddities that libjpeg
-// warns about (stray bytes between markers) are let pass, as PIL does.
+// Decodes to 8-bit RGB. A picture whose data or end marker is missing fails as image_truncated. Harmless
+// oddities that libjpeg warns about (stray bytes between markers) are accepted, as PIL does.
 DecodedImage decode_jpeg(std::span<const std::byte> bytes);
 
 }  // namespace q3d::loaders::pictures

@@ -1,4 +1,4 @@
-// PNG decoding through OpenCV, after the file's own structure and checksums have been checked.
+// Decodes PNG with OpenCV, after checking the file's structure and checksums.
 #pragma once
 
 #include <cstddef>
@@ -10,9 +10,9 @@ namespace q3d::loaders::pictures {
 
 bool is_png(std::span<const std::byte> bytes);
 
-// 8-bit RGB. Chunks that do not hold pixels (colour profiles, EXIF, text) are left out before OpenCV sees the
-// file: they change no pixel here, and libpng prints its opinion of them. (A file forged so that its
-// checksums fit its damage still fails, but libpng has its say on stderr.)
+// Decodes to 8-bit RGB. Chunks that hold no pixels (colour profiles, EXIF, text) are removed before OpenCV
+// sees the file: they do not change pixels here, and libpng prints warnings about them. (If a file was forged
+// so that its checksums fit the damage, it still fails, but libpng prints to stderr.)
 DecodedImage decode_png(std::span<const std::byte> bytes);
 
 }  // namespace q3d::loaders::pictures

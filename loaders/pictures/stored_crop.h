@@ -1,4 +1,5 @@
-// The larger crop that shards store: enough context to cut every augmented patch from it with one warp.
+// The larger crop that shards store. It has enough context to cut every augmented patch from it with one
+// warp.
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -7,8 +8,8 @@
 
 namespace q3d::loaders::pictures {
 
-// Augmentation's reach: a box enlarged 1.3 times and turned by 45 degrees spans 1.3 sqrt(2) sides, and its
-// centre moves by up to 0.02 sides either way: 1.3 sqrt(2) + 2 * 0.02 = 1.88.
+// How far augmentation reaches: a box that is enlarged 1.3 times and turned by 45 degrees spans 1.3 sqrt(2)
+// sides, and its centre moves by up to 0.02 sides in each direction: 1.3 sqrt(2) + 2 * 0.02 = 1.88.
 inline constexpr double kStoredCropScale = 1.9;
 
 struct StoredCrop {
@@ -17,21 +18,22 @@ struct StoredCrop {
   Affine from_image{};  // image px -> crop px
 };
 
-// Covers `scale` times the box and two pixels on each side for the warp's neighbours, at min_side_px, or less
-// where the source has fewer pixels there.
+// Makes a crop that covers `scale` times the box, plus two pixels on each side for the neighbours that the
+// warp needs. Its side is min_side_px, or less if the source has fewer pixels there.
 //
-// Fewer: the pixels are copied as they are, so a patch cut from the crop is the one cut from the image, save
-// for single pixels whose position, a multiple of 1/32 px in OpenCV's warp, rounds the other way. More: the
-// crop is reduced by area averaging. At 480 px the box itself then has 253 px, which is the patch's own
-// resolution (0.69 to 1.28 crop px a patch px over the augmentation's scales), and it does not alias as the
-// official bilinear warp of a large picture does.
+// If the source has fewer pixels, they are copied unchanged. A patch cut from the crop is then the one cut
+// from the image, except for single pixels whose position, a multiple of 1/32 px in OpenCV's warp, is rounded
+// the other way. If the source has more pixels, the crop is reduced by area averaging. At 480 px the box
+// itself then has 253 px, which is the resolution of the patch (0.69 to 1.28 crop px for a patch px over the
+// augmentation's scales), and it does not alias as the official bilinear warp of a large picture does.
 //
-// Throws std::invalid_argument on wrong image types, a scale below 1, or a side below the patch's.
+// Throws std::invalid_argument for wrong image types, a scale below 1, or a side below the patch's.
 StoredCrop make_stored_crop(const cv::Mat& rgb, const cv::Mat& mask, const SquareBox& box,
                             double scale = kStoredCropScale, int min_side_px = 480);
 
-// Crop px -> patch px, from image px -> patch px (augmented or not) and the crop's from_image: a training
-// feed cuts its patch with warp_patch(crop.rgb, crop.mask, patch_from_stored_crop(...)).
+// Returns the map from crop px to patch px. It is computed from the map from image px to patch px (augmented
+// or not) and the crop's from_image. A training feed cuts its patch with warp_patch(crop.rgb, crop.mask,
+// patch_from_stored_crop(...)).
 Affine patch_from_stored_crop(const Affine& patch_from_image, const Affine& crop_from_image);
 
 }  // namespace q3d::loaders::pictures

@@ -1,4 +1,4 @@
-// The names behind species.h. Sources are stated there and at each table.
+// The tables of names behind species.h. That header and each table state their sources.
 #pragma once
 
 #include <array>
@@ -111,8 +111,7 @@ inline constexpr std::array<FamilyNames, 6> kFamilies{{{manifests::Family::none,
                                                        {manifests::Family::bovidae, kBovidae},
                                                        {manifests::Family::hippopotamidae, kHippopotamidae}}};
 
-// Words that leave a record of Animal Kingdom or AP-10K out. "Echina" is the dataset's own spelling of
-// echidna.
+// Words that exclude a record of Animal Kingdom or AP-10K. "Echina" is the dataset's own spelling of echidna.
 inline constexpr std::string_view kNotQuadrupeds[] = {
     "bird",     "eagle",   "primate",  "monkey",   "macaque", "baboon",  "chimpanzee", "gorilla", "orangutan",
     "langur",   "lemur",   "gibbon",   "marmoset", "tamarin", "ape",     "alouatta",   "uakari",  "human",

@@ -43,7 +43,7 @@ void print_summary(const build::BuildSummary& summary) {
     if (count > 0) fmt::print(stderr, "  {} {}", kind, count);
   }
   fmt::print(stderr, "\n  {} shards in {}\n", summary.dataset.shards.size(), summary.folder.string());
-  fmt::print(stderr, "  every verdict: {}\n", (summary.folder / "verdicts.csv").string());
+  fmt::print(stderr, "  all verdicts: {}\n", (summary.folder / "verdicts.csv").string());
   fmt::print(stderr, "next: quadruped3d verify {0}\n      quadruped3d inspect {0} --sheet sheet.png\n",
              summary.folder.string());
 }
@@ -64,7 +64,7 @@ nlohmann::ordered_json to_json(const build::BuildSummary& summary) {
           {"seconds", summary.seconds}};
 }
 
-// The veto of the command line stands over the config's.
+// --veto replaces the config's key `veto`.
 config::BuildConfig configured(const Arguments& arguments) {
   config::BuildConfig config = config::load_build_config(arguments.configs);
   if (arguments.veto.empty()) return config;
@@ -78,31 +78,36 @@ config::BuildConfig configured(const Arguments& arguments) {
 Command add_build(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command =
-      app.add_subcommand("build", "annotated photographs in, a versioned dataset of labels out");
-  command->add_option("-c,--config", arguments->configs, "JSON config; a second one is laid over the first")
+      app.add_subcommand("build", "make a versioned dataset of labels from annotated photographs");
+  command
+      ->add_option("-c,--config", arguments->configs,
+                   "JSON config file; keys of a later file replace those of an earlier one")
       ->required()
       ->check(CLI::ExistingFile);
-  command->add_option("-o,--out", arguments->run.out, "output folder; OUT/latest is the newest dataset")
+  command->add_option("-o,--out", arguments->run.out, "output folder; OUT/latest will be the newest dataset")
       ->required();
   command
-      ->add_option("--veto", arguments->veto, "file of sample ids to leave out, one a line; after a tab, why")
+      ->add_option("--veto", arguments->veto,
+                   "file with the ids of samples to leave out, one per line; a reason may follow after a tab")
       ->check(CLI::ExistingFile);
-  command->add_option("-t,--threads", arguments->run.threads, "threads that read and decode (0 = all cores)")
+  command
+      ->add_option("-t,--threads", arguments->run.threads,
+                   "number of threads that read and decode pictures (0 = all cores)")
       ->check(CLI::NonNegativeNumber);
-  command->add_flag("--json", arguments->json, "print a machine-readable summary on stdout");
-  command->add_flag("-q,--quiet", arguments->run.quiet, "no progress");
+  command->add_flag("--json", arguments->json, "print a machine-readable summary to stdout");
+  command->add_flag("-q,--quiet", arguments->run.quiet, "do not show progress");
   command->footer(
       "Examples:\n"
       "  quadruped3d build --config configs/sample.json --config out/thresholds.json --out out\n"
       "  quadruped3d build -c my.json -o out --json > summary.json\n"
       "  quadruped3d build -c my.json -o out --veto veto.txt\n"
       "  quadruped3d build -c configs/world_pools/animal3d.json -o out/pools/animal3d\n"
-      "A build that was killed goes on where it left off when the same command is run again, and ends with "
-      "the same\n"
-      "bytes. Bad pictures and records never stop it: they are counted, with reasons, in verdicts.csv.\n"
-      "Without thresholds in the config it stops and names `quadruped3d calibrate`. Datasets whose role is "
-      "\"truth\" or\n"
-      "\"2d_only\" bring their labels: they need neither thresholds nor a network (docs/config.md).");
+      "If a build was stopped or killed, run the same command again: it continues where it left off and\n"
+      "ends with the same bytes. Bad pictures and records never stop a build; they are counted and listed\n"
+      "with their reasons in verdicts.csv.\n"
+      "Pseudo labels need thresholds in the config; `quadruped3d calibrate` finds them. Datasets of the\n"
+      "role \"truth\" or \"2d_only\" bring their own labels and need neither thresholds nor a network\n"
+      "(docs/config.md).");
   return [arguments] {
     const build::BuildSummary summary = build::build(configured(*arguments), arguments->run);
     print_summary(summary);

@@ -30,11 +30,12 @@ void print_pool(const build::CalibratedPool& pool) {
   fmt::print(stderr, "  retained {:.1f} %, refined {:.1f} %, discarded {:.1f} %\n", 100 * result.retained,
              100 * result.refined, 100 * (1 - result.retained - result.refined));
   if (!result.reached) {
-    fmt::print(stderr,
-               "  warning: too few candidates reach delta = {} to give the refined share that was asked for; "
-               "this is\n"
-               "  the closest. A larger tta.learning_rate or a smaller delta lets more through.\n",
-               result.thresholds.delta);
+    fmt::print(
+        stderr,
+        "  warning: too few candidates reach delta = {}, so the refined share that you asked for cannot be\n"
+        "  met; these thresholds come closest. A larger tta.learning_rate or a smaller delta lets more\n"
+        "  candidates pass.\n",
+        result.thresholds.delta);
   }
 }
 
@@ -87,31 +88,35 @@ nlohmann::ordered_json to_json(const build::CalibrationSummary& summary) {
 Command add_calibrate(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command =
-      app.add_subcommand("calibrate", "thresholds for a pool and a network, from the shares wanted");
-  command->add_option("-c,--config", arguments->configs, "JSON config; a second one is laid over the first")
+      app.add_subcommand("calibrate", "find the thresholds that give the wanted shares of labels");
+  command
+      ->add_option("-c,--config", arguments->configs,
+                   "JSON config file; keys of a later file replace those of an earlier one")
       ->required()
       ->check(CLI::ExistingFile);
   command
-      ->add_option("-o,--out", arguments->run.out, "output folder; a later build there finds the predictions")
+      ->add_option("-o,--out", arguments->run.out,
+                   "output folder; a later build in it reuses the predictions")
       ->required();
-  command->add_option("-w,--write", arguments->write, "write the thresholds as a config layer");
+  command->add_option("-w,--write", arguments->write,
+                      "write the thresholds to this file, which build takes as a second --config");
   command->add_option("-f,--figure", arguments->figure,
-                      "write an SVG of yield and AUC against the threshold");
-  command->add_option("-t,--threads", arguments->run.threads, "threads that read and decode (0 = all cores)")
+                      "write an SVG figure of yield and AUC against the threshold");
+  command
+      ->add_option("-t,--threads", arguments->run.threads,
+                   "number of threads that read and decode pictures (0 = all cores)")
       ->check(CLI::NonNegativeNumber);
-  command->add_flag("--json", arguments->json, "print a machine-readable summary on stdout");
-  command->add_flag("-q,--quiet", arguments->run.quiet, "no progress");
+  command->add_flag("--json", arguments->json, "print a machine-readable summary to stdout");
+  command->add_flag("-q,--quiet", arguments->run.quiet, "do not show progress");
   command->footer(
       "Examples:\n"
-      "  quadruped3d calibrate --config my.json --out out --write out/thresholds.json --figure "
-      "out/thresholds.svg\n"
+      "  quadruped3d calibrate --config my.json --out out --write out/thresholds.json \\\n"
+      "      --figure out/thresholds.svg\n"
       "  quadruped3d build --config my.json --config out/thresholds.json --out out\n"
-      "The shares are the config's \"calibrate\": {\"retained\", \"refined\"}; by default those of the "
-      "paper\n"
-      "(14K candidates: 5K retained, 4K refined, 5K discarded). delta is taken as given. With "
-      "\"per_dataset\": "
-      "true every\ndataset gets thresholds of its own. Guards that bound labels act after this: they lower "
-      "the shares.");
+      "The config's \"calibrate\": {\"retained\", \"refined\"} sets the shares. The default shares are the\n"
+      "paper's (of 14K candidates, 5K retained, 4K refined, 5K discarded). delta stays as the config has\n"
+      "it. With \"per_dataset\": true every dataset gets thresholds of its own. Guards that bound labels\n"
+      "act later and lower the shares.");
   return [arguments] {
     const build::CalibrationSummary summary =
         build::calibrate(config::load_build_config(arguments->configs), arguments->run);

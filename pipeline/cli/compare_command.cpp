@@ -39,7 +39,8 @@ int run(const Arguments& arguments) {
   if (!arguments.out.empty()) manifests::write_file_atomically(arguments.out, document.dump(2) + "\n");
   std::FILE* const people = arguments.json ? stderr : stdout;
   fmt::print(people, "{}", evaluation::summary_text(comparison));
-  fmt::print(people, "{} resamples over pictures{}; better or worse where the interval leaves out 0\n",
+  fmt::print(people,
+             "{} bootstrap resamples over pictures{}; better and worse mean that the interval excludes 0\n",
              arguments.options.bootstrap.resamples,
              comparison.pairs > 1 ? fmt::format(" and {} pairs of runs", comparison.pairs) : "");
   if (!arguments.out.empty()) fmt::print(people, "wrote {}\n", arguments.out.string());
@@ -53,30 +54,31 @@ Command add_compare(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   evaluation::CompareOptions& options = arguments->options;
   CLI::App* command =
-      app.add_subcommand("compare", "is one network better than another on the same pictures?");
-  command->add_option("--before", arguments->before, "folders that `evaluate` wrote, one a seed")
+      app.add_subcommand("compare", "test whether one network is better than another on the same pictures");
+  command->add_option("--before", arguments->before, "folders that `evaluate` wrote, one for each seed")
       ->required()
       ->check(CLI::ExistingPath);
-  command->add_option("--after", arguments->after, "as many folders, in the order of their partners")
+  command->add_option("--after", arguments->after, "the same number of folders, in the same order")
       ->required()
       ->check(CLI::ExistingPath);
   command->add_option("--before-setting", options.before_setting,
-                      "e.g. \"prediction\"; needs --after-setting");
-  command->add_option("--after-setting", options.after_setting, "e.g. \"TTA 30\"");
-  command->add_option("--resamples", options.bootstrap.resamples, "of the bootstrap")
+                      "setting to compare, such as \"prediction\"; needs --after-setting");
+  command->add_option("--after-setting", options.after_setting,
+                      "setting to compare it with, such as \"TTA 30\"");
+  command->add_option("--resamples", options.bootstrap.resamples, "number of resamples of the bootstrap")
       ->capture_default_str()
       ->check(CLI::PositiveNumber);
-  command->add_option("--seed", options.bootstrap.seed, "of the bootstrap")->capture_default_str();
-  command->add_option("-o,--out", arguments->out, "write the comparison as JSON");
-  command->add_flag("--json", arguments->json, "print the comparison as JSON on stdout");
+  command->add_option("--seed", options.bootstrap.seed, "seed of the bootstrap")->capture_default_str();
+  command->add_option("-o,--out", arguments->out, "write the comparison to this file as JSON");
+  command->add_flag("--json", arguments->json, "print the comparison as JSON to stdout");
   command->footer(
       "Examples:\n"
       "  quadruped3d compare --before out/stage1/evaluation --after out/stage3/evaluation\n"
-      "  quadruped3d compare --before s1_a s1_b s1_c --after s3_a s3_b s3_c --out comparison.json   three "
-      "seeds\n"
-      "  quadruped3d compare --before eval --after eval --before-setting prediction --after-setting 'TTA "
-      "30'\n"
-      "Samples are paired by id; a paired bootstrap gives the 95 % interval of the mean difference.");
+      "  quadruped3d compare --before s1_a s1_b s1_c --after s3_a s3_b s3_c --out comparison.json\n"
+      "  quadruped3d compare --before eval --after eval --before-setting prediction \\\n"
+      "      --after-setting 'TTA 30'\n"
+      "Samples are paired by id. A paired bootstrap gives the 95 % interval of the mean difference. The\n"
+      "second example compares three seeds, the third two settings of one evaluation.");
   return [arguments] { return run(*arguments); };
 }
 

@@ -40,7 +40,8 @@ int run(const Arguments& arguments) {
   std::FILE* const people = arguments.json ? stderr : stdout;
   fmt::print(people, "{}", evaluation::summary_text(comparison));
   fmt::print(people,
-             "PA in mm. {} resamples over pictures{}; better or worse where the interval leaves out 0\n",
+             "PA in mm. {} bootstrap resamples over pictures{}; better and worse mean that the interval "
+             "excludes 0\n",
              arguments.bootstrap.resamples,
              comparison.pairs.size() > 1 ? fmt::format(" and {} pairs", comparison.pairs.size()) : "");
   if (!arguments.out.empty()) fmt::print(people, "wrote {}\n", arguments.out.string());
@@ -52,28 +53,29 @@ int run(const Arguments& arguments) {
 
 Command add_compare_labels(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command =
-      app.add_subcommand("compare-labels", "which rules keep the truer labels, at equal yield?");
+  CLI::App* command = app.add_subcommand(
+      "compare-labels", "test which of two builds' rules keep the more accurate labels, at equal yield");
   command->add_option("--before", arguments->before, "folders that `evaluate-labels --report` wrote")
       ->required()
       ->check(CLI::ExistingDirectory);
   command
       ->add_option("--after", arguments->after,
-                   "as many, of builds over the same pools, in the order of their partners")
+                   "the same number of folders, of builds over the same pools, in the same order")
       ->required()
       ->check(CLI::ExistingDirectory);
-  command->add_option("--resamples", arguments->bootstrap.resamples, "of the bootstrap")
+  command->add_option("--resamples", arguments->bootstrap.resamples, "number of resamples of the bootstrap")
       ->capture_default_str()
       ->check(CLI::PositiveNumber);
-  command->add_option("--seed", arguments->bootstrap.seed, "of the bootstrap")->capture_default_str();
-  command->add_option("-o,--out", arguments->out, "write the comparison as JSON");
-  command->add_flag("--json", arguments->json, "print the comparison as JSON on stdout");
+  command->add_option("--seed", arguments->bootstrap.seed, "seed of the bootstrap")->capture_default_str();
+  command->add_option("-o,--out", arguments->out, "write the comparison to this file as JSON");
+  command->add_flag("--json", arguments->json, "print the comparison as JSON to stdout");
   command->footer(
       "Examples:\n"
       "  quadruped3d compare-labels --before out/paper_labels --after out/strict_labels\n"
-      "  quadruped3d compare-labels --before p1 p2 p3 --after s1 s2 s3 --out comparison.json   three seeds\n"
-      "The larger set of labels is cut to the smaller one's size, worst L_proj first. docs/evaluation.md "
-      "shows the\nwhole way from two builds to this command.");
+      "  quadruped3d compare-labels --before p1 p2 p3 --after s1 s2 s3 --out comparison.json\n"
+      "The larger set of labels is cut to the size of the smaller one; labels with the largest L_proj go\n"
+      "first. The second example compares three pairs of builds. docs/evaluation.md shows the whole way\n"
+      "from two builds to this command.");
   return [arguments] { return run(*arguments); };
 }
 

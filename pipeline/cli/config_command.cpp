@@ -19,7 +19,7 @@ int show(const Arguments& arguments) {
   if (arguments.configs.empty()) {
     for (const std::string& name : config::profile_names())
       document["profiles"][name] = config::profile_layer(name);
-    fmt::print(stderr, "the profiles; with --config, a whole config with its profile expanded\n");
+    fmt::print(stderr, "these are the profiles; with --config, the command prints a whole config\n");
   } else {
     document = config::effective_config(config::load_build_config(arguments.configs));
   }
@@ -31,17 +31,19 @@ int show(const Arguments& arguments) {
 
 Command add_config(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand("config", "what a config says, nothing left unsaid");
+  CLI::App* command = app.add_subcommand("config", "show a whole config, with all defaults");
   command->require_subcommand(1);
-  CLI::App* shown =
-      command->add_subcommand("show", "the config with its profile expanded and defaults filled in, as JSON");
-  shown->add_option("-c,--config", arguments->configs, "JSON config; a second one is laid over the first")
+  CLI::App* shown = command->add_subcommand(
+      "show", "print the config as JSON, with its profile expanded and all defaults filled in");
+  shown
+      ->add_option("-c,--config", arguments->configs,
+                   "JSON config file; keys of a later file replace those of an earlier one")
       ->check(CLI::ExistingFile);
   const char* const footer =
       "Examples:\n"
-      "  quadruped3d config show                                  what the profiles stand for\n"
+      "  quadruped3d config show                                  what each profile stands for\n"
       "  quadruped3d config show -c my.json -c out/thresholds.json\n"
-      "What is printed is a config again and gives the same dataset. docs/config.md explains every key.";
+      "The output is a config again and gives the same dataset. docs/config.md explains every key.";
   command->footer(footer);
   shown->footer(footer);
   return [arguments] { return show(*arguments); };

@@ -44,30 +44,32 @@ void print_summary(const curation::CurationSummary& summary) {
     fmt::print(stderr, "\n  {}\n", split);
     for (const auto& [verdict, count] : verdicts) fmt::print(stderr, "    {:<22} {}\n", verdict, count);
   }
-  fmt::print(stderr, "\n  every picture: {}\n", summary.list.string());
-  fmt::print(stderr, "next: name it as \"curation\" of the dataset in a build's config (docs/datasets.md)\n");
+  fmt::print(stderr, "\n  list of all pictures: {}\n", summary.list.string());
+  fmt::print(stderr,
+             "next: name this list as \"curation\" of the dataset in a build's config (docs/datasets.md)\n");
 }
 
 }  // namespace
 
 Command add_curate(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command =
-      app.add_subcommand("curate", "a balanced subset of a large set, by species: a list that build takes");
-  command->add_option("-c,--config", arguments->configs, "JSON rule; a second one is laid over the first")
+  CLI::App* command = app.add_subcommand(
+      "curate", "choose a balanced subset of a large dataset, by species; build takes the list");
+  command
+      ->add_option("-c,--config", arguments->configs,
+                   "JSON file with the rule; keys of a later file replace those of an earlier one")
       ->required()
       ->check(CLI::ExistingFile);
   command->add_option("-o,--out", arguments->out, "folder for the list")->required();
-  command->add_flag("--json", arguments->json, "print a machine-readable summary on stdout");
+  command->add_flag("--json", arguments->json, "print a machine-readable summary to stdout");
   command->footer(
       "Examples:\n"
       "  quadruped3d curate --config configs/quadruped2d.json --out out/curation\n"
-      "and then in a build's config\n"
-      "  \"datasets\": [ { \"name\": \"superanimal\", ..., \"curation\": \"out/curation/quadruped2d.csv\" } "
-      "]\n"
-      "No picture is read. The same files, rule and seed give the same list; NAME.json beside it keeps the "
-      "rule, the\n"
-      "digests of what was read, and all counts.");
+      "Then name the list in the config of a build:\n"
+      "  \"datasets\": [ { \"name\": \"superanimal\", ...,\n"
+      "                  \"curation\": \"out/curation/quadruped2d.csv\" } ]\n"
+      "The command reads no pictures. The same files, rule and seed give the same list. NAME.json beside\n"
+      "the list holds the rule, the digests of the files that were read, and all counts.");
   return [arguments] {
     const curation::CurationSummary summary =
         curation::run_curate(curation::load_curation_config(arguments->configs), arguments->out);

@@ -34,7 +34,7 @@ int run(const Arguments& arguments) {
   fmt::print(people, "\n{} (sha256 {}...) on {}, in {}\n\n{}", result.checkpoint,
              result.checkpoint_sha256.substr(0, 12), result.device, run::human_duration(result.seconds),
              evaluation::summary_text(result, tables, arguments.species));
-  fmt::print(people, "every sample: {}\nnext: quadruped3d compare --before {} --after <another evaluation>\n",
+  fmt::print(people, "all samples: {}\nnext: quadruped3d compare --before {} --after <another evaluation>\n",
              (arguments.out / "samples.csv").string(), arguments.out.string());
   if (arguments.json) fmt::print("{}\n", evaluation::to_json(result, tables).dump());
   return 0;
@@ -43,51 +43,55 @@ int run(const Arguments& arguments) {
 void add_settings(CLI::App& command, evaluation::EvaluationOptions& options) {
   command
       .add_option("--tta", options.settings.tta_iterations,
-                  "measure after so many adaptation steps too (at the config's tta.learning_rate)")
+                  "also measure after this many adaptation steps (at the config's tta.learning_rate)")
       ->check(CLI::NonNegativeNumber);
   command
       .add_option("--tta-curve", options.settings.curve,
-                  "measure these iterates of adaptation, as they are, e.g. 0,10,20,30,40,50,60,70")
+                  "also measure these iterates of adaptation as they are, such as 0,10,20,30,40,50,60,70")
       ->delimiter(',');
   command
       .add_option("--visible", options.settings.visible_shares,
-                  "give --tta only these shares of the visible keypoints, too; metrics use all")
+                  "also run --tta with only these shares of the visible keypoints; the metrics use all")
       ->delimiter(',');
-  command.add_option("--limit", options.limit, "so many samples of each dataset, evenly spaced (0 = all)")
+  command
+      .add_option("--limit", options.limit, "take this many samples of each dataset, evenly spaced (0 = all)")
       ->check(CLI::NonNegativeNumber);
-  command.add_option("--seed", options.seed, "of k-means and of the keypoints hidden by --visible")
+  command.add_option("--seed", options.seed, "seed of k-means and of the keypoints that --visible hides")
       ->capture_default_str();
   command.add_flag(
       "--official-means", options.official_means,
-      "count samples without a visible keypoint, or without truth, as 0, as the official code does");
+      "count samples without a visible keypoint or without truth as 0, as the official code does");
 }
 
 }  // namespace
 
 Command add_evaluate(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand("evaluate", "the paper's metrics of a network on test sets");
-  command->add_option("-c,--config", arguments->configs, "JSON config; a second one is laid over the first")
+  CLI::App* command =
+      app.add_subcommand("evaluate", "measure a network on test sets with the paper's metrics");
+  command
+      ->add_option("-c,--config", arguments->configs,
+                   "JSON config file; keys of a later file replace those of an earlier one")
       ->required()
       ->check(CLI::ExistingFile);
   command
       ->add_option("--checkpoint", arguments->checkpoint,
-                   "takes the place of the config's network.checkpoint")
+                   "weights to measure, instead of the config's network.checkpoint")
       ->check(CLI::ExistingFile);
   command->add_option("-o,--out", arguments->out, "folder for evaluation.json, samples.csv and tables.csv")
       ->required();
   add_settings(*command, arguments->options);
-  command->add_flag("--species", arguments->species, "show the table of species, too");
+  command->add_flag("--species", arguments->species, "also show the table by species");
   command
-      ->add_option("-t,--threads", arguments->options.threads, "threads that read and decode (0 = all cores)")
+      ->add_option("-t,--threads", arguments->options.threads,
+                   "number of threads that read and decode pictures (0 = all cores)")
       ->check(CLI::NonNegativeNumber);
-  command->add_flag("--json", arguments->json, "print evaluation.json on stdout");
-  command->add_flag("-q,--quiet", arguments->options.quiet, "no progress");
+  command->add_flag("--json", arguments->json, "print evaluation.json to stdout");
+  command->add_flag("-q,--quiet", arguments->options.quiet, "do not show progress");
   command->footer(
       "Examples:\n"
-      "  quadruped3d evaluate --config configs/world_evaluation.json --checkpoint "
-      "out/stage1/model.safetensors \\\n"
-      "      --out out/stage1/evaluation\n"
+      "  quadruped3d evaluate --config configs/world_evaluation.json \\\n"
+      "      --checkpoint out/stage1/model.safetensors --out out/stage1/evaluation\n"
       "  quadruped3d evaluate -c my.json -o out/eval --limit 50                      a quick look\n"
       "  quadruped3d evaluate -c my.json -o out/eval --tta 30 --visible 0.7,0.5,0.3  with adaptation\n"
       "  quadruped3d evaluate -c my.json -o out/eval --tta-curve 0,5,10,20,30,50,70  does it overfit?\n"

@@ -23,7 +23,7 @@ int run(const Arguments& arguments) {
   std::FILE* const people = arguments.json ? stderr : stdout;
   fmt::print(people, "\n{}\n{}", result.dataset, evaluation::summary_text(result));
   if (!arguments.report.empty()) {
-    fmt::print(people, "every candidate: {}\n", (arguments.report / "labels.csv").string());
+    fmt::print(people, "all candidates: {}\n", (arguments.report / "labels.csv").string());
   }
   if (arguments.json) fmt::print("{}\n", evaluation::to_json(result).dump());
   return 0;
@@ -34,31 +34,33 @@ int run(const Arguments& arguments) {
 Command add_evaluate_labels(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   evaluation::LabelOptions& options = arguments->options;
-  CLI::App* command = app.add_subcommand("evaluate-labels", "how true are the labels that a build made?");
+  CLI::App* command =
+      app.add_subcommand("evaluate-labels", "measure how close the labels of a build are to known truth");
   command->add_option("-c,--config", arguments->configs, "the build's config, thresholds included")
       ->required()
       ->check(CLI::ExistingFile);
   command->add_option("-o,--out", options.run.out, "the build's output folder")
       ->required()
       ->check(CLI::ExistingDirectory);
-  command->add_option("--truth", options.truth, "hidden truth of the pool's pictures")
+  command->add_option("--truth", options.truth, "file with the hidden truth of the pool's pictures")
       ->check(CLI::ExistingFile);
   command->add_option("--masks", options.masks, "folder that the truth's mask paths start from")
       ->check(CLI::ExistingDirectory);
   command->add_option("--report", arguments->report, "folder for labels.json and labels.csv");
-  command->add_option("-t,--threads", options.run.threads, "threads that read and decode (0 = all cores)")
+  command
+      ->add_option("-t,--threads", options.run.threads,
+                   "number of threads that read and decode pictures (0 = all cores)")
       ->check(CLI::NonNegativeNumber);
-  command->add_flag("--json", arguments->json, "print labels.json on stdout");
-  command->add_flag("-q,--quiet", options.run.quiet, "no progress");
+  command->add_flag("--json", arguments->json, "print labels.json to stdout");
+  command->add_flag("-q,--quiet", options.run.quiet, "do not show progress");
   command->footer(
       "Example:\n"
-      "  quadruped3d evaluate-labels --config configs/world_stage2.json --config out/thresholds.json --out "
-      "out \\\n"
-      "      --truth data/world/truth/superanimal_quadruped_train.json --masks data/world --report "
-      "out/labels\n"
-      "Measures the kept, the refined before and after, the discarded and the whole pool. Needs no network: "
-      "the "
-      "build's\npredictions are read from its output folder. docs/evaluation.md defines every number.");
+      "  quadruped3d evaluate-labels --config configs/world_stage2.json --config out/thresholds.json \\\n"
+      "      --out out --truth data/world/truth/superanimal_quadruped_train.json --masks data/world \\\n"
+      "      --report out/labels\n"
+      "The command measures the whole pool, the kept labels, the refined labels before and after\n"
+      "refinement, and the discarded predictions. It does not run the network: it reads the build's\n"
+      "predictions from its output folder. docs/evaluation.md defines every number.");
   return [arguments] { return run(*arguments); };
 }
 

@@ -21,23 +21,24 @@ struct Arguments {
 Command add_explain(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command =
-      app.add_subcommand("explain", "one candidate's whole story, and why it ended as it did");
+      app.add_subcommand("explain", "show all that is known of one candidate, and why it got its verdict");
   command->add_option("dataset", arguments->dataset, "a dataset's folder, or an output folder of `build`")
       ->required()
       ->check(CLI::ExistingPath);
-  command->add_option("sample", arguments->sample, "its id, as in the first column of verdicts.csv")
+  command
+      ->add_option("sample", arguments->sample,
+                   "the id of the sample, as in the first column of verdicts.csv")
       ->required();
-  command->add_flag("--json", arguments->json, "print it as JSON on stdout");
+  command->add_flag("--json", arguments->json, "print the result as JSON");
   command->footer(
       "Examples:\n"
       "  quadruped3d explain out 'superanimal/train/images/wolf_1.jpg#12'\n"
       "  quadruped3d explain out 'superanimal/train/images/wolf_1.jpg#12' --json | jq .curve\n"
-      "It tells the source, the crop, the error of every keypoint, the course of adaptation, and which "
-      "number "
-      "decided.\n"
-      "Predictions of what was not kept lie in OUT/stages, so a dataset that was moved away from there tells "
-      "less.\n"
-      "To leave a sample out of the next build, put its id on a line of a file: build --veto FILE.");
+      "The result has the source, the crop, the error of every keypoint, the course of adaptation, and the\n"
+      "number that decided the verdict.\n"
+      "The predictions of dropped candidates lie in OUT/stages. A dataset that was moved away from there\n"
+      "can therefore explain less.\n"
+      "To leave a sample out of the next build, write its id into a file and run build --veto FILE.");
   return [arguments] {
     const nlohmann::ordered_json story = dataset::explain(arguments->dataset, arguments->sample);
     fmt::print("{}", arguments->json ? story.dump() + "\n" : dataset::tell(story));

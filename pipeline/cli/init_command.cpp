@@ -27,24 +27,24 @@ struct Arguments {
 Command add_init(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command =
-      app.add_subcommand("init", "a seeded, untrained checkpoint and the synthetic SMAL asset");
-  command->add_option("-o,--out", arguments->out, "checkpoint to write (safetensors)");
-  command->add_option("-s,--size", arguments->size, "vith (the paper's), small or tiny")
+      app.add_subcommand("init", "write an untrained checkpoint, or the synthetic body model and its priors");
+  command->add_option("-o,--out", arguments->out, "write an untrained checkpoint to this file (safetensors)");
+  command->add_option("-s,--size", arguments->size, "size of the network: vith (the paper's), small or tiny")
       ->capture_default_str();
   command->add_option("--seed", arguments->seed, "the same seed gives the same bytes")->capture_default_str();
   command->add_option("--smal-asset", arguments->asset,
-                      "also write the synthetic quadruped with SMAL's dimensions");
+                      "write the synthetic quadruped, a body model with SMAL's dimensions, to this file");
   command->add_option("--priors", arguments->priors,
-                      "also write the synthetic quadruped's pose and shape priors, for training");
-  command->add_flag("--json", arguments->json, "print a machine-readable summary on stdout");
+                      "write the synthetic quadruped's pose and shape priors, for training, to this file");
+  command->add_flag("--json", arguments->json, "print a machine-readable summary to stdout");
   command->footer(
       "Examples:\n"
-      "  quadruped3d init --size small --out data/small.safetensors --smal-asset "
-      "data/smal_synthetic.safetensors\n"
+      "  quadruped3d init --size small --out data/small.safetensors \\\n"
+      "      --smal-asset data/smal_synthetic.safetensors\n"
       "  quadruped3d init --size vith --seed 7 --out data/vith.safetensors\n"
-      "An untrained network predicts nothing useful: it is there to try the machinery at any size. SMAL "
-      "itself cannot\n"
-      "be redistributed; the synthetic quadruped has its dimensions.");
+      "An untrained network predicts nothing useful. It is a start for training, or a way to try the\n"
+      "program at any size. SMAL itself must not be redistributed; the synthetic quadruped has its\n"
+      "dimensions.");
   return [arguments] {
     if (arguments->out.empty() && arguments->asset.empty() && arguments->priors.empty()) {
       throw run::ConfigError(

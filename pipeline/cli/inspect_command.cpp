@@ -25,23 +25,24 @@ struct Arguments {
 Command add_inspect(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command =
-      app.add_subcommand("inspect", "what a dataset or a shard holds, in words or as a picture");
+      app.add_subcommand("inspect", "show what a dataset or a shard contains, as text or as a picture");
   command->add_option("path", arguments->path, "a dataset's folder, an output folder, or one shard")
       ->required()
       ->check(CLI::ExistingPath);
-  command->add_option("--sample", arguments->sample, "print one sample whole, by its id");
+  command->add_option("--sample", arguments->sample, "print everything about the sample with this id");
   command->add_option("--sheet", arguments->sheet,
-                      "write a PNG of crops with annotated and projected keypoints");
-  command->add_option("--count", arguments->count, "samples on the sheet")
+                      "write a PNG that shows crops with annotated and projected keypoints");
+  command->add_option("--count", arguments->count, "number of samples on the sheet")
       ->capture_default_str()
       ->check(CLI::Range(1, 400));
-  command->add_flag("--json", arguments->json, "print the description as JSON on stdout");
+  command->add_flag("--json", arguments->json, "print the description as JSON in one line");
   command->footer(
       "Examples:\n"
       "  quadruped3d inspect out\n"
       "  quadruped3d inspect out --sheet sheet.png --count 36\n"
       "  quadruped3d inspect out/latest/shards/000000.h5 --sample 'superanimal/test/images/wolf_1.jpg#12'\n"
-      "On the sheet, green discs are the annotated keypoints and red crosses the labelled body's.");
+      "On the sheet, green discs are the annotated keypoints and red crosses are those of the labelled\n"
+      "body.");
   return [arguments] {
     if (!arguments->sheet.empty()) {
       report::write_contact_sheet(arguments->sheet,

@@ -33,15 +33,17 @@ void print_summary(const leakage::LeakageRunSummary& summary, const std::filesys
   for (const auto& [evidence, leaks] : summary.leaks_by_evidence) {
     fmt::print(stderr, "    {:<12} {}\n", evidence, leaks);
   }
-  fmt::print(stderr, "  groups of pictures of the pool that are alike: {} ({} pictures)\n", summary.groups,
+  fmt::print(stderr, "  groups of pictures in the pool that look alike: {} ({} pictures)\n", summary.groups,
              summary.pictures_in_groups);
-  fmt::print(stderr, "  to look at: {}\n  lists: leaks.csv, duplicates.csv and leakage.json beside it\n",
+  fmt::print(stderr,
+             "  page with the pictures: {}\n  lists beside it: leaks.csv, duplicates.csv and leakage.json\n",
              (out / "leakage.html").string());
   if (summary.test_pictures == 0) {
     fmt::print(stderr, "next: name the test sets under \"leakage\" in the config (docs/config.md)\n");
   } else {
-    fmt::print(stderr,
-               "next: quadruped3d build with the same config leaves the pseudo labels among them out\n");
+    fmt::print(
+        stderr,
+        "next: run quadruped3d build with the same config; it leaves out the pseudo labels among them\n");
   }
 }
 
@@ -49,29 +51,34 @@ void print_summary(const leakage::LeakageRunSummary& summary, const std::filesys
 
 Command add_leakage(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command =
-      app.add_subcommand("leakage", "pictures of the pool that are in a test set too, or twice in the pool");
-  command->add_option("-c,--config", arguments->configs, "JSON config; a second one is laid over the first")
+  CLI::App* command = app.add_subcommand(
+      "leakage", "find pictures of the pool that are also in a test set, or twice in the pool");
+  command
+      ->add_option("-c,--config", arguments->configs,
+                   "JSON config file; keys of a later file replace those of an earlier one")
       ->required()
       ->check(CLI::ExistingFile);
   command
-      ->add_option("-o,--out", arguments->run.out, "folder for the lists, the page and the cache of hashes")
+      ->add_option("-o,--out", arguments->run.out,
+                   "folder for the lists, the HTML page and the cache of hashes")
       ->required();
-  command->add_option("-t,--threads", arguments->run.threads, "threads that read and decode (0 = all cores)")
+  command
+      ->add_option("-t,--threads", arguments->run.threads,
+                   "number of threads that read and decode pictures (0 = all cores)")
       ->check(CLI::NonNegativeNumber);
-  command->add_flag("--json", arguments->json, "print a machine-readable summary on stdout");
-  command->add_flag("-q,--quiet", arguments->run.quiet, "no progress");
+  command->add_flag("--json", arguments->json, "print a machine-readable summary to stdout");
+  command->add_flag("-q,--quiet", arguments->run.quiet, "do not show progress");
   command->footer(
       "Examples:\n"
       "  quadruped3d leakage --config my.json --out out\n"
-      "where my.json is a build's config with\n"
-      "  \"leakage\": { \"test_sets\": [ { \"name\": \"animal3d\", \"format\": \"prima\", \"root\": "
-      "\"animal3d\",\n"
-      "                                \"annotations\": \"test.json\", \"split\": \"test\" } ] }\n"
-      "A copy is known by its bytes, by its ImageNet, COCO or VOC name, or by what it shows (resized, "
-      "recompressed,\n"
-      "mirrored; not cut out). Hashes are kept in the folder: give the build's own, and it finds them "
-      "there.");
+      "The config is that of a build, with the test sets under \"leakage\":\n"
+      "  \"leakage\": { \"test_sets\": [\n"
+      "    { \"name\": \"animal3d\", \"format\": \"prima\", \"root\": \"animal3d\",\n"
+      "      \"annotations\": \"test.json\", \"split\": \"test\" } ] }\n"
+      "A copy is recognised by equal bytes, by its ImageNet, COCO or VOC name, or by its content. The\n"
+      "search by content finds pictures that were resized, recompressed or mirrored, but not cut-outs.\n"
+      "The hashes are cached in the output folder. Use the output folder of the build, so that the build\n"
+      "finds them there.");
   return [arguments] {
     const leakage::LeakageRunSummary summary =
         leakage::run_leakage(config::load_build_config(arguments->configs), arguments->run);

@@ -24,19 +24,19 @@ constexpr int kInterrupted = 130;
 int run(int argc, char** argv) {
   namespace cli = q3d::pipeline::cli;
   CLI::App app{
-      "Builds Quadruped3D datasets: pseudo-3D labels (SMAL pose, shape, camera) for 2D-annotated photographs "
-      "of quadrupeds,\nwith a verdict and a provenance for every one of them."};
+      "Builds 3D datasets of quadrupeds: it adds pseudo-3D labels (SMAL pose, shape, camera) to photographs\n"
+      "that have 2D keypoints, and records for every label how it was made and why it was kept or dropped."};
   app.name("quadruped3d");
   app.require_subcommand(1);
   app.set_version_flag("--version", "quadruped3d " + std::string(run::version()));
   app.footer(
       "First steps:\n"
-      "  quadruped3d sample --out data/world                 make pictures to try it on\n"
+      "  quadruped3d sample --out data/world                 render pictures to try the program with\n"
       "  quadruped3d init --size small --out data/small.safetensors\n"
       "  quadruped3d calibrate --config configs/sample.json --out out --write out/thresholds.json\n"
       "  quadruped3d build --config configs/sample.json --config out/thresholds.json --out out\n"
       "  quadruped3d verify out\n"
-      "`quadruped3d COMMAND --help` explains a command by example.");
+      "`quadruped3d COMMAND --help` explains a command with examples.");
   const std::vector<std::pair<std::string, cli::Command>> commands = {
       {"build", cli::add_build(app)},
       {"calibrate", cli::add_calibrate(app)},
@@ -73,13 +73,14 @@ int main(int argc, char** argv) {
   try {
     return run(argc, argv);
   } catch (const q3d::pipeline::run::Interrupted&) {
-    fmt::print(stderr, "stopped; run the same command to go on where it left off\n");
+    fmt::print(stderr, "stopped; run the same command to continue\n");
     return kInterrupted;
   } catch (const q3d::pipeline::run::ConfigError& error) {
     fmt::print(stderr, "quadruped3d: {}\n", error.what());
     return kUsage;
   } catch (const std::bad_alloc&) {
-    fmt::print(stderr, "quadruped3d: out of memory; lower network.batch, tta.batch or shards.unit_size\n");
+    fmt::print(stderr,
+               "quadruped3d: out of memory; use a smaller network.batch, tta.batch or shards.unit_size\n");
     return kFailure;
   } catch (const std::exception& error) {
     fmt::print(stderr, "quadruped3d: {}\n", error.what());

@@ -24,23 +24,27 @@ struct Arguments {
 Command add_sample(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   world::WorldOptions& options = arguments->world;
-  CLI::App* command =
-      app.add_subcommand("sample", "render a world of quadrupeds with known truth, in native layouts");
-  command->add_option("-o,--out", options.out, "folder to make")->required();
+  CLI::App* command = app.add_subcommand(
+      "sample", "render pictures of quadrupeds with known 3D truth, in the layouts of public datasets");
+  command->add_option("-o,--out", options.out, "folder to create")->required();
   command->add_option("--seed", options.seed, "the same seed gives the same bytes")->capture_default_str();
-  command->add_option("--share", options.share, "of the default number of pictures")->capture_default_str();
-  command->add_option("--pixels", options.picture_px, "longer side of a photograph")->capture_default_str();
-  command->add_option("-t,--threads", options.threads, "0 = all cores; never changes a byte")
+  command->add_option("--share", options.share, "share of the default number of pictures to render")
       ->capture_default_str();
-  command->add_flag("--json", arguments->json, "print a machine-readable summary on stdout");
-  command->add_flag("-q,--quiet", arguments->quiet, "no progress");
+  command->add_option("--pixels", options.picture_px, "longer side of a photograph, in pixels")
+      ->capture_default_str();
+  command
+      ->add_option("-t,--threads", options.threads,
+                   "number of threads (0 = all cores); it does not change the result")
+      ->capture_default_str();
+  command->add_flag("--json", arguments->json, "print a machine-readable summary to stdout");
+  command->add_flag("-q,--quiet", arguments->quiet, "do not show progress");
   command->footer(
       "Examples:\n"
       "  quadruped3d sample --out data/world --share 0.08     a few hundred pictures\n"
-      "  quadruped3d sample --out data/world                  the whole world\n"
-      "Writes animal3d/, control_animal3dlatest/, superanimal_quadruped/ and animal_kingdom/ as their users "
-      "have them,\n"
-      "the hidden truth of the 2D-only sets in truth/, and the synthetic SMAL asset in assets/.");
+      "  quadruped3d sample --out data/world                  the whole world, 5,000 pictures\n"
+      "The folders animal3d/, control_animal3dlatest/, superanimal_quadruped/ and animal_kingdom/ have the\n"
+      "layouts of these datasets. truth/ has the hidden truth of the two sets that have 2D keypoints only,\n"
+      "and assets/ has the synthetic SMAL asset. docs/synthetic-world.md describes the world.");
   return [arguments] {
     world::WorldOptions& wanted = arguments->world;
     std::unique_ptr<run::Progress> progress;
@@ -55,7 +59,7 @@ Command add_sample(CLI::App& app) {
     progress.reset();
     for (const auto& [name, count] : summary.pictures) fmt::print(stderr, "  {:<28} {:>6}\n", name, count);
     fmt::print(stderr, "{} pictures in {}{}\n", summary.total, wanted.out.string(),
-               summary.reused ? " (they were there already)" : "");
+               summary.reused ? " (they existed already)" : "");
     if (arguments->json) {
       const nlohmann::ordered_json document = {
           {"pictures", summary.pictures}, {"total", summary.total}, {"smal_asset", summary.asset.string()}};

@@ -24,7 +24,7 @@ void print_summary(const training::TrainingSummary& summary) {
   if (summary.finished) {
     fmt::print(stderr, "  weights: {}\n", summary.model.string());
   } else {
-    fmt::print(stderr, "  run the same command to go on\n");
+    fmt::print(stderr, "  run the same command to continue\n");
   }
 }
 
@@ -39,31 +39,34 @@ nlohmann::ordered_json to_json(const training::TrainingSummary& summary) {
 
 Command add_train(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand("train", "shards in, a trained network out");
-  command->add_option("-c,--config", arguments->configs, "JSON config; a second one is laid over the first")
+  CLI::App* command = app.add_subcommand("train", "train a network from shards");
+  command
+      ->add_option("-c,--config", arguments->configs,
+                   "JSON config file; keys of a later file replace those of an earlier one")
       ->required()
       ->check(CLI::ExistingFile);
-  command->add_option("-s,--stage", arguments->stage, "the config's stage to train, such as 1 or 3")
+  command->add_option("-s,--stage", arguments->stage, "name of the stage in the config, such as 1 or 3")
       ->required();
-  command->add_option("-o,--out", arguments->options.out, "folder of this run: state, log and weights")
+  command->add_option("-o,--out", arguments->options.out, "folder of this run, for state, log and weights")
       ->required();
   command
-      ->add_option("-t,--threads", arguments->options.threads, "threads that prepare batches (0 = all cores)")
+      ->add_option("-t,--threads", arguments->options.threads,
+                   "number of threads that prepare batches (0 = all cores)")
       ->check(CLI::NonNegativeNumber);
   command
       ->add_option("--max-steps", arguments->options.max_steps,
-                   "save and leave after so many steps (0 = train to the end)")
+                   "save and stop after this many steps (0 = train to the end)")
       ->check(CLI::NonNegativeNumber);
-  command->add_flag("--json", arguments->json, "print a machine-readable summary on stdout");
-  command->add_flag("-q,--quiet", arguments->options.quiet, "no progress");
+  command->add_flag("--json", arguments->json, "print a machine-readable summary to stdout");
+  command->add_flag("-q,--quiet", arguments->options.quiet, "do not show progress");
   command->footer(
       "Examples:\n"
       "  quadruped3d train --config configs/world_training.json --stage 1 --out out/stage1\n"
       "  quadruped3d train -c my.json --stage 3 -o out/stage3 --max-steps 1000\n"
       "  torchrun --no-python --nproc-per-node 4 quadruped3d train -c my.json --stage 1 -o out/stage1\n"
-      "A run that was stopped goes on from its newest state when the same command is run again, with the "
-      "weights that\n"
-      "it would have had anyway. docs/training.md describes the config, the log and the state.");
+      "If a run was stopped, run the same command again: it continues from the newest state and ends with\n"
+      "the same weights as a run that was never stopped. docs/training.md describes the config, the log\n"
+      "and the state.");
   return [arguments] {
     const training::TrainingSummary summary = training::train(
         training::load_training_config(arguments->configs, arguments->stage), arguments->options);

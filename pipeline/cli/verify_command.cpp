@@ -21,17 +21,20 @@ struct Arguments {
 
 Command add_verify(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand("verify", "read a dataset whole and check every byte of it");
-  command->add_option("dataset", arguments->dataset, "a dataset's folder, or an output folder (its latest)")
+  CLI::App* command = app.add_subcommand("verify", "read a whole dataset and check every byte of it");
+  command
+      ->add_option("dataset", arguments->dataset,
+                   "a dataset's folder, or an output folder (its newest dataset is checked)")
       ->required()
       ->check(CLI::ExistingDirectory);
-  command->add_flag("--json", arguments->json, "print a machine-readable summary on stdout");
-  command->add_flag("-q,--quiet", arguments->quiet, "no progress");
+  command->add_flag("--json", arguments->json, "print a machine-readable summary to stdout");
+  command->add_flag("-q,--quiet", arguments->quiet, "do not show progress");
   command->footer(
       "Examples:\n"
       "  quadruped3d verify out\n"
       "  quadruped3d verify out/quadruped3d-0123456789ab --json\n"
-      "Exit code 0: sound. 1: something is wrong; every problem is listed.");
+      "Exit code 0 means that the dataset is sound. Exit code 1 means that something is wrong; every\n"
+      "problem is listed.");
   return [arguments] {
     const dataset::VerifySummary summary = dataset::verify(arguments->dataset, arguments->quiet);
     for (const std::string& problem : summary.problems) fmt::print(stderr, "problem: {}\n", problem);

@@ -163,7 +163,7 @@ class Ranks(unittest.TestCase):
         os.kill(target(process.pid), signal.SIGINT)
         _, errors = process.communicate(timeout=120)
         self.assertNotEqual(process.returncode, 0)
-        self.assertIn("run the same command to go on", errors)
+        self.assertIn("run the same command to continue", errors)
         self.assertTrue((self.root / out / "state.safetensors").exists(), errors)
         return lines()
 

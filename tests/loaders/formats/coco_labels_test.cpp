@@ -90,8 +90,9 @@ TEST(CocoLabels, a_confidence_in_the_place_of_v_is_the_weight) {
   EXPECT_EQ(record.keypoints[1].v, 0.25F);
   EXPECT_EQ(record.keypoints[1].weight, 0.0F) << "below the default of 0.6";
   EXPECT_EQ(record.keypoints[0].weight, 1.0F);
-  EXPECT_THAT(joined(dataset.notes), HasSubstr("taken as their weight: 2; of these below min_confidence 0.6 "
-                                               "(weight 0): 1"));
+  EXPECT_THAT(joined(dataset.notes),
+              HasSubstr("which becomes their weight: 2; of these, below min_confidence 0.6 "
+                        "(weight 0): 1"));
   lab.options.min_confidence = 0.2;
   EXPECT_EQ(lab.load(document).records[0].keypoints[1].weight, 0.25F);
 }
@@ -109,7 +110,8 @@ TEST(CocoLabels, a_missing_box_is_made_around_all_keypoints) {
   EXPECT_DOUBLE_EQ(box.w_px, 21 + 4.4);
   EXPECT_DOUBLE_EQ(box.h_px, 22 + 4.4);
   EXPECT_EQ(dataset.records[1].box.x_px, 10.0) << "the file's own";
-  EXPECT_THAT(joined(dataset.notes), HasSubstr("no box: made around the keypoints, with a margin of 0.1"));
+  EXPECT_THAT(joined(dataset.notes),
+              HasSubstr("no box: it was made around the keypoints, with a margin of 0.1"));
   lab.options.box_margin = 0.5;
   EXPECT_DOUBLE_EQ(lab.load(document).records[0].box.w_px, 21 + 22);
   // One point spans no box.
@@ -150,7 +152,7 @@ TEST(CocoLabels, refuses_what_it_would_misread) {
   EXPECT_THAT(thrown(document), HasSubstr("categories[1]: keypoints: got names that differ"));
   document = lab_document();
   document["categories"][0]["keypoints"][3] = "tail";
-  EXPECT_THAT(thrown(document), HasSubstr("\"tail\", which is none of mine"));
+  EXPECT_THAT(thrown(document), HasSubstr("\"tail\", which is not in the topology mine"));
   lab.options.topology = lab.folder.root() / "nowhere.json";
   EXPECT_THAT(thrown(lab_document()), HasSubstr("nowhere.json"));
 }

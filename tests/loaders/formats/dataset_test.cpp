@@ -111,7 +111,7 @@ TEST(SuperAnimal, keypoints_in_another_order_are_taken_by_name) {
   const Dataset dataset = folder.load("superanimal", document);
   EXPECT_EQ(dataset.records[0].keypoints[4].x_px, rows[28][0].get<double>()) << "right_front_paw";
   EXPECT_EQ(dataset.records[0].keypoints[15].x_px, rows[29][0].get<double>()) << "right_front_knee";
-  EXPECT_THAT(joined(dataset.notes), HasSubstr("taken by name"));
+  EXPECT_THAT(joined(dataset.notes), HasSubstr("matched by name"));
 }
 
 TEST(SuperAnimal, keypoints_of_another_dataset_are_refused) {

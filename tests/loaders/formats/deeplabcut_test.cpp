@@ -98,9 +98,10 @@ TEST_P(SeveralAnimals, one_record_an_individual_that_is_there) {
   EXPECT_EQ(dataset.records[1].keypoints[kRightEye].y_px, 1120.0);
   EXPECT_EQ(dataset.records[2].keypoints[kNose].x_px, 1.0);
   EXPECT_EQ(dataset.records[2].failure, Reason::none) << dataset.records[2].failure_detail;
-  EXPECT_THAT(joined(dataset.notes), HasSubstr("individuals without a keypoint in a frame: 3"));
   EXPECT_THAT(joined(dataset.notes),
-              HasSubstr("keypoints of no animal (individual \"single\") are left out: 1"));
+              HasSubstr("individuals that have no keypoint in a frame and are left out there: 3"));
+  EXPECT_THAT(joined(dataset.notes),
+              HasSubstr("keypoints that belong to no animal (individual \"single\") are left out: 1"));
 }
 
 INSTANTIATE_TEST_SUITE_P(BothFiles, SeveralAnimals, ::testing::Values("labels_multi.h5", "labels_multi.csv"));
@@ -121,8 +122,9 @@ TEST_P(Predictions, likelihoods_are_weights_and_frames_find_their_pictures) {
   EXPECT_EQ(record.keypoints[kLeftEye].x_px, 11.0);
   EXPECT_EQ(record.keypoints[kRightEye].v, 0.45F);
   EXPECT_EQ(record.keypoints[kRightEye].weight, 0.0F);
-  EXPECT_THAT(joined(dataset.notes), HasSubstr("taken as their weight: 12; of these below min_confidence 0.6 "
-                                               "(weight 0): 6"));
+  EXPECT_THAT(joined(dataset.notes),
+              HasSubstr("which becomes their weight: 12; of these, below min_confidence 0.6 "
+                        "(weight 0): 6"));
   EXPECT_EQ(dataset.records[2].failure, Reason::image_missing) << "there is no frame 2";
   project.options.min_confidence = 0.97;
   EXPECT_EQ(project.load(GetParam()).records[1].failure, Reason::no_visible_keypoints);
@@ -263,7 +265,7 @@ TEST(PickledNames, what_a_pickle_can_claim_is_bounded) {
     return "";
   };
   EXPECT_THAT(refusal(std::string(1'000'000, '(') + std::string(1'000'000, 'l') + "."),
-              HasSubstr("got deeper lists, expected at most 4"));
+              HasSubstr("got lists that are nested too deeply, expected at most 4"));
   const auto columns = [](const std::string& name, int names, int tuples) {
     std::string pickle = "(lp0\n(I1\n(lp1\n(V" + name + "\np2\n";
     for (int i = 1; i < names; ++i) pickle += "g2\n";
@@ -273,7 +275,7 @@ TEST(PickledNames, what_a_pickle_can_claim_is_bounded) {
   };
   EXPECT_EQ(read_pickled_columns(columns("snout", 8, 3), "here"),
             std::vector(3, std::vector<std::string>(8, "snout")));
-  EXPECT_THAT(refusal(columns("snout", 9, 1)), HasSubstr("at most 8 names a tuple"));
+  EXPECT_THAT(refusal(columns("snout", 9, 1)), HasSubstr("at most 8 names in a tuple"));
   EXPECT_THAT(refusal(columns(std::string(1001, 'x'), 1, 1)), HasSubstr("1000 bytes a name"));
   EXPECT_THAT(refusal(columns("snout", 1, 100'001)), HasSubstr("a pickle of another form"));
 }

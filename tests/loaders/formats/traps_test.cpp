@@ -96,7 +96,8 @@ TEST(Traps, trap_07_masks_that_are_missing_or_are_the_picture) {
   }
   EXPECT_NE(dataset.records[2].mask_path, "");
   EXPECT_THAT(joined(dataset.notes), HasSubstr("not there (no mask): 1 record, first set/train/"));
-  EXPECT_THAT(joined(dataset.notes), HasSubstr("names the picture itself (no mask): 1 record"));
+  EXPECT_THAT(joined(dataset.notes),
+              HasSubstr("names the picture itself, so the sample has no mask: 1 record"));
   // 0/1 masks and photographs under another name: DecodeMask.kinds_are_told_apart.
 }
 
@@ -246,7 +247,7 @@ TEST(Traps, trap_13_two_names_for_one_file_are_noted) {
   document["images"][0]["file_name"] = "/disk/x/horse_11361_0.png";
   document["images"][1]["file_name"] = "/disk/y/horse_11361_0.png";
   EXPECT_THAT(joined(folder.load("superanimal", document).notes),
-              HasSubstr("names too (one must be wrong): 1"));
+              HasSubstr("as an earlier name (one of them must be wrong): 1"));
 }
 
 TEST(Traps, trap_13_links) {
