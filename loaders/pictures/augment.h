@@ -2,7 +2,7 @@
 //
 // Official code: do_augmentation and get_example. In that code, the mirror flip and the extreme crop crash
 // and are off in every released configuration. This file does not offer the extreme crop. The mirror is our
-// own (loaders/mirror.h) and off by default.
+// own (loaders/keypoints/mirror.h) and off by default.
 #pragma once
 
 #include <array>
