@@ -6,6 +6,7 @@ CONFIG ?=
 JOBS   ?= $(shell nproc)
 SCHEDULE ?= full
 SEED     ?= 0
+ALLOW_UPGRADES ?=
 FUZZ_SECONDS ?= 60
 FUZZ_TARGETS ?=
 
@@ -31,8 +32,8 @@ build: $(BUILD)/build.ninja  ## compile everything, tests too
 	@cmake --build $(BUILD) --parallel $(JOBS)
 	@ln -sfn $(PRESET)/pipeline/quadruped3d build/quadruped3d
 
-setup:  ## install Debian packages and LibTorch where they are missing
-	@tools/setup.sh
+setup:  ## install Debian packages and LibTorch where they are missing (docs/install.md)
+	@tools/setup.sh $(if $(ALLOW_UPGRADES),--allow-upgrades)
 
 assets: setup  ## fetch the official weights and body where there is a network, verify and import them
 	@.venv/bin/python tools/import_assets.py fetch
