@@ -75,8 +75,8 @@ ANIMER = Terms(
 )
 
 INTRODUCTION = "The files that `make assets` fetches belong to others and have terms of their own. In short:"
-CONCLUSION = """What is made from these files (converted weights, meshes, datasets of SMAL parameters) inherits their conditions.
-These are summaries. Read the full texts; they are what you agree to."""
+CONCLUSION = """What is made from these files (converted weights, meshes, datasets of SMAL parameters) inherits their
+conditions. These are summaries. Read the full texts; they are what you agree to."""
 
 
 def obtain_consent(folder: str, terms: Sequence[Terms], given: bool, say: Say) -> None:

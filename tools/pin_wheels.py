@@ -29,8 +29,9 @@ def resolve(python: str, machine: str) -> dict[str, tuple[str, str, str]]:
     with tempfile.TemporaryDirectory() as folder:
         report = pathlib.Path(folder) / "report.json"
         command = [sys.executable, "-m", "pip", "install", "--dry-run", "--ignore-installed", "--no-cache-dir"]
-        command += ["--quiet", "--disable-pip-version-check", "--only-binary", ":all:", "--target", folder, "--implementation", "cp"]
-        command += ["--python-version", python, "--report", str(report), "--requirement", str(SOURCE)]
+        command += ["--quiet", "--disable-pip-version-check", "--only-binary", ":all:", "--target", folder]
+        command += ["--implementation", "cp", "--python-version", python, "--report", str(report)]
+        command += ["--requirement", str(SOURCE)]
         for platform in platforms:
             command += ["--platform", platform]
         subprocess.run(command, check=True, stdout=sys.stderr)
@@ -47,7 +48,7 @@ def render(resolved: list[dict[str, tuple[str, str, str]]]) -> str:
     """The text of requirements.txt. Throws ValueError when a package has another version for another target."""
     lines = [
         f"# CPython {', '.join(PYTHONS)} on Linux ({', '.join(MACHINES)})",
-        "# Written by tools/pin_wheels.py from requirements.in. pip --require-hashes accepts these files and no others.",
+        "# tools/pin_wheels.py writes this file from requirements.in. pip accepts these wheels and no others.",
     ]
     faults = []
     for name in sorted(set().union(*resolved)):

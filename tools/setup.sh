@@ -34,7 +34,8 @@ fail() {
 
 # The last lines that the last command printed.
 last_output() {
-  awk '/^== /{text = ""; next} {text = text $0 "\n"} END {printf "%s", text}' "$log" | tail -n "$1"
+  awk '/^== /{text = ""; next} !/^Requirement already/ {text = text $0 "\n"} END {printf "%s", text}' "$log" |
+    tail -n "$1"
 }
 
 # fail_with_log MESSAGE...: the same, after the end of the log.
@@ -209,46 +210,55 @@ make_venv() {
 }
 
 pip_advice() {
-  local output
-  output=$(last_output 40)
-  case "$output" in
+  local again="Then run make setup again; it continues with what is missing."
+  case "$(last_output 40)" in
     *"No space left"*)
-      echo "The disk is full. .venv takes 5 GB, and pip needs 3 GB more in ${TMPDIR:-/tmp} meanwhile."
+      echo "The disk is full. .venv takes 5 GB, and pip needs 3 GB more in ${TMPDIR:-/tmp} meanwhile. Make room."
+      echo "$again"
       ;;
     *"DO NOT MATCH THE HASHES"*)
-      echo "A file is not the one that tools/requirements.txt pins. Do not use it: a mirror or proxy has replaced it."
+      echo "A file is not the one that tools/requirements.txt pins; a mirror or proxy may have replaced it."
+      echo "Do not use it. \`pip config list\` shows which index pip asks."
       ;;
     *"No matching distribution"*)
-      echo "The package index has no such wheel for $(uname -m) and this Python (see tools/requirements.txt)."
+      echo "The package index, or the folder that stands for it, has no such wheel for $(uname -m) and this Python."
+      echo "tools/requirements.txt names the wheels that are needed."
       ;;
     *"Failed to establish"* | *"timed out"* | *"Name or service"* | *"resolution"*)
       echo "The package index cannot be reached. docs/install.md (\"Offline\") says how to install from a folder."
+      echo "$again"
       ;;
-    *) echo "The whole output is in $log." ;;
+    *) printf '%s\n' "The whole output is in $log. Remove the cause." "$again" ;;
   esac
-  echo "Then run make setup again; it continues with what is missing."
 }
 
 install_wheels() {
-  local stamp broken count advice
+  local stamp broken missing=() amount advice
   stamp=.venv/installed-$(sha256sum tools/requirements.txt | cut -c1-12)
   [ -f "$stamp" ] && [ -x .venv/bin/python ] &&
     compgen -G '.venv/lib/python3*/site-packages/torch/lib/libtorch_cpu.so' >/dev/null && return
   open_log
   make_venv
-  count=$(grep -cE '^[a-z0-9-]+==' tools/requirements.txt)
   # pip takes a package for installed once its metadata is there, however few of its files were written.
   broken=$(.venv/bin/python tools/check_wheels.py --forget tools/requirements.txt) ||
     say "these packages in .venv are only half there and are installed anew: ${broken//$'\n'/, }"
-  say "installing $count Python wheels, LibTorch among them, into .venv (at most 3 GB to download, 5 GB on disk)"
-  if ! run .venv/bin/python -m pip install --disable-pip-version-check --no-input --progress-bar off \
-    --only-binary :all: --require-hashes -r tools/requirements.txt; then
-    mapfile -t advice < <(pip_advice)
-    fail_with_log "pip could not install the Python wheels." "${advice[@]}"
+  mapfile -t missing < <(.venv/bin/python tools/check_wheels.py tools/requirements.txt)
+  if [ ${#missing[@]} -gt 0 ]; then
+    amount="${#missing[@]} of $(grep -cE '^[a-z0-9-]+==' tools/requirements.txt)"
+    case " ${missing[*]} " in
+      *" torch "*) amount+=" Python wheels, LibTorch among them, into .venv (3 GB to download, 5 GB on disk)" ;;
+      *) amount+=" Python wheels into .venv: ${missing[*]}" ;;
+    esac
+    say "installing $amount"
+    if ! run .venv/bin/python -m pip install --disable-pip-version-check --no-input --progress-bar off \
+      --only-binary :all: --require-hashes -r tools/requirements.txt; then
+      mapfile -t advice < <(pip_advice)
+      fail_with_log "pip could not install the Python wheels." "${advice[@]}"
+    fi
+    missing=("$(.venv/bin/python tools/check_wheels.py tools/requirements.txt)") ||
+      fail "pip reported success, but .venv lacks files of these packages: ${missing[*]//$'\n'/, }" \
+        "Remove .venv and run make setup again."
   fi
-  broken=$(.venv/bin/python tools/check_wheels.py tools/requirements.txt) ||
-    fail "pip reported success, but .venv lacks files of these packages: ${broken//$'\n'/, }" \
-      "Remove .venv and run make setup again."
   rm -f .venv/installed-*
   touch "$stamp"
 }

@@ -229,7 +229,7 @@ class TermsTest(HubCase):
             "register",
             "https://smal.is.tue.mpg.de/license.html",
             "open_clip_config.json",
-            "inherits their conditions",
+            "datasets of SMAL parameters) inherits their\nconditions",
         ):
             self.assertIn(mention, out)
         self.assertNotIn("AniMer", out)
