@@ -6,6 +6,8 @@ CONFIG ?=
 JOBS   ?= $(shell nproc)
 SCHEDULE ?= full
 SEED     ?= 0
+ALLOW_UPGRADES ?=
+ACCEPT_LICENCES ?=
 FUZZ_SECONDS ?= 60
 FUZZ_TARGETS ?=
 
@@ -31,11 +33,11 @@ build: $(BUILD)/build.ninja  ## compile everything, tests too
 	@cmake --build $(BUILD) --parallel $(JOBS)
 	@ln -sfn $(PRESET)/bin/quadruped3d build/quadruped3d
 
-setup:  ## install Debian packages and LibTorch where they are missing
-	@tools/setup.sh
+setup:  ## install Debian packages and LibTorch where they are missing (docs/install.md)
+	@tools/setup.sh $(if $(ALLOW_UPGRADES),--allow-upgrades)
 
-assets: setup  ## fetch the official weights and body where there is a network, verify and import them
-	@.venv/bin/python tools/import_assets.py fetch
+assets: setup  ## fetch, verify and import the official weights and body (ACCEPT_LICENCES=1 accepts their terms)
+	@.venv/bin/python tools/import_assets.py fetch $(if $(ACCEPT_LICENCES),--accept-licences)
 
 $(BUILD)/build.ninja: | setup
 	cmake --preset $(PRESET) $(CMAKE_ARGS)

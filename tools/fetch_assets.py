@@ -17,6 +17,7 @@ import urllib.request
 from dataclasses import dataclass
 from typing import Callable, Optional, Sequence
 
+import asset_terms
 import prima_import
 import safetensors_file
 import smal_import
@@ -57,8 +58,16 @@ BIOCLIP_WEIGHTS = Asset(("open_clip_pytorch_model.bin",), BIOCLIP, "BioCLIP, for
 BACKBONE = Asset(("amr_vitbb.pth",), PRIMA, "AniMer's ViT, for training from scratch")
 
 
-def run(folder: str, stage: str, training: bool, offline: bool, say: Say) -> int:
-    """Returns 0 when every asset is there, verified and imported, else 1. Throws what the importers throw."""
+def run(folder: str, stage: str, training: bool, offline: bool, accept: bool, say: Say) -> int:
+    """Shows the terms of the files and, once the user has accepted them, fetches, verifies and imports the files.
+
+    folder: where the results go; the official files go into its folder `official`. stage: "1" or "3", the network.
+    training: also fetch what training from scratch starts from. offline: download nothing. accept: the user accepts
+    the terms beforehand. Returns 0 when every file is there, verified and imported, else 1. Throws what
+    asset_terms.obtain_consent and the importers throw.
+    """
+    terms = [asset_terms.PRIMA, asset_terms.SMAL, asset_terms.BIOCLIP] + [asset_terms.ANIMER] * training
+    asset_terms.obtain_consent(folder, terms, accept, say)
     store = Store(os.path.join(folder, "official"), offline, say)
     checkpoint, body, families, pose = (store.get(asset) for asset in (CHECKPOINTS[stage], BODY, FAMILIES, POSE_PRIOR))
     bioclip_config = store.get(BIOCLIP_CONFIG, optional=not training)
@@ -80,7 +89,7 @@ def run(folder: str, stage: str, training: bool, offline: bool, say: Say) -> int
         else:
             importer(*sources, target, say)
     if store.missing:
-        say("\nThese files are missing. Download them in a browser, after reading their licences (docs/assets.md):")
+        say("\nThese files are missing. Download them in a browser:")
         for asset in store.missing:
             say(f"  {store.path(asset.names[0])}: {asset.meaning}, from {HUB}/{asset.repository}")
         say("and run `make assets` again.")

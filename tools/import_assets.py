@@ -84,9 +84,16 @@ def _priors(options) -> None:
 
 
 def _fetch(options) -> int:
+    import asset_terms
     import fetch_assets
 
-    return fetch_assets.run(options.folder, options.stage, options.training, options.offline, _say)
+    try:
+        return fetch_assets.run(
+            options.folder, options.stage, options.training, options.offline, options.accept_licences, _say
+        )
+    except asset_terms.ConsentMissing as error:
+        print(f"import_assets: {error}", file=sys.stderr)
+        return USAGE
 
 
 def _setting(text: str) -> tuple[str, object]:
@@ -111,7 +118,7 @@ By hand:
   import_assets.py priors my_smpl_data_00781_4_all.pkl walking_toy_symmetric_pose_prior_with_cov_35parts.pkl \\
       assets/priors.safetensors
 `import_assets.py COMMAND --help` explains a command by example.
-Exit codes: 0 done, 1 a file cannot be used (the message says why), 2 wrong usage, 130 stopped.""",
+Exit codes: 0 done, 1 a file cannot be used (the message says why), 2 wrong usage or no consent, 130 stopped.""",
     )
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     _add_checkpoint(commands)
@@ -232,12 +239,16 @@ def _add_fetch(commands) -> None:
   import_assets.py fetch --stage 3       the Stage 3 network instead
   import_assets.py fetch --offline       only verify and import what lies in assets/official
 
-Without a network it says which files to put where. The files have licences of their own: docs/assets.md.""",
+It shows the terms of the files and asks whether you accept them; --accept-licences accepts them without asking, and
+without a terminal that is the only way (exit code 2 otherwise). Without a network it says which files to put where.""",
     )
     added.add_argument("--folder", default="assets", help="where the results go (default: assets)")
     added.add_argument("--stage", choices=("1", "3"), default="1", help="which network (default: 1, the dataset's)")
     added.add_argument("--training", action="store_true", help="also fetch AniMer's ViT and BioCLIP's weights")
     added.add_argument("--offline", action="store_true", help="download nothing")
+    added.add_argument(
+        "--accept-licences", "--accept-licenses", action="store_true", help="accept the terms of the files unasked"
+    )
 
 
 if __name__ == "__main__":

@@ -1,9 +1,11 @@
 """`make assets` against a hub on this machine."""
 
+import dataclasses
 import hashlib
 import http.server
 import os
 import pathlib
+import shutil
 import subprocess
 import tempfile
 import threading
@@ -11,6 +13,7 @@ import unittest
 from unittest import mock
 
 import support  # first of ours: it sets the path
+import asset_terms
 import fetch_assets
 import prima_import
 import safetensors_file
@@ -53,7 +56,7 @@ class _Handler(http.server.BaseHTTPRequestHandler):
         pass
 
 
-class FetchTest(unittest.TestCase):
+class HubCase(unittest.TestCase):
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
@@ -90,10 +93,12 @@ class FetchTest(unittest.TestCase):
 
         return run
 
+
+class FetchTest(HubCase):
     def fetch(self, *options):
         self.imported.clear()
         self.hub.asked.clear()
-        return support.run("fetch", "--folder", self.folder, *options)
+        return support.run("fetch", "--folder", self.folder, "--accept-licences", *options)
 
     def test_downloads_verifies_and_imports(self):
         code, out, err = self.fetch()
@@ -180,6 +185,94 @@ class FetchTest(unittest.TestCase):
         code, out, _ = self.fetch()
         self.assertEqual((code, [name for name, *_ in self.imported]), (1, ["import_body", "import_priors"]))
         self.assertIn("answers 401", out)
+
+
+class TermsTest(HubCase):
+    """Nothing is fetched or imported before the user accepts the terms."""
+
+    def fetch(self, *options, terminal=False, answer=None):
+        """A run without --accept-licences. answer: what the user types at the terminal; None stands for Ctrl-D."""
+        self.imported.clear()
+        self.hub.asked.clear()
+        self.questions = []
+
+        def ask(question):
+            self.questions.append(question)
+            if answer is None:
+                raise EOFError
+            return answer
+
+        with mock.patch("builtins.input", ask), mock.patch("sys.stdin", mock.Mock(isatty=lambda: terminal)):
+            return support.run("fetch", "--folder", self.folder, *options)
+
+    def assert_nothing_happened(self):
+        self.assertEqual((self.hub.asked, self.imported, os.listdir(self.folder)), ([], [], []))
+
+    def test_without_a_terminal_it_stops_and_says_how_to_consent(self):
+        for options in ((), ("--offline",)):
+            code, out, err = self.fetch(*options)
+            self.assertEqual(code, 2)
+            self.assertIn("Max Planck Institute for Intelligent Systems", out)
+            self.assertIn("no terminal to ask at", err)
+            self.assertIn("make assets ACCEPT_LICENCES=1", err)
+            self.assertEqual(self.questions, [])
+            self.assert_nothing_happened()
+
+    def test_owner_and_conditions_of_every_file(self):
+        _, out, _ = self.fetch()
+        for mention in (
+            "s1ckpt*.ckpt",
+            "Mackenzie Mathis, Xiaohang Yu and contributors",
+            "academic, non-commercial use only",
+            "my_smpl_*.pkl",
+            "non-commercial scientific research only; no redistribution",
+            "register",
+            "https://smal.is.tue.mpg.de/license.html",
+            "open_clip_config.json",
+            "datasets of SMAL parameters) inherits their\nconditions",
+        ):
+            self.assertIn(mention, out)
+        self.assertNotIn("AniMer", out)
+        self.assertIn("AniMer", self.fetch("--training")[1])
+
+    def test_a_user_who_does_not_accept(self):
+        for answer in ("no", "", "n", "yes, but", None):
+            code, _, err = self.fetch(terminal=True, answer=answer)
+            self.assertEqual((code, len(self.questions)), (1, 1))
+            self.assertIn("you did not accept the terms", err)
+            self.assert_nothing_happened()
+
+    def test_a_user_who_accepts_is_asked_once(self):
+        for answer in ("yes", " Y "):
+            code, out, _ = self.fetch(terminal=True, answer=answer)
+            self.assertEqual((code, len(self.questions), len(self.imported)), (0, 1, 3))
+            record = self.folder / "accepted-terms.txt"
+            self.assertIn(f"recorded in {record}", out)
+            self.assertEqual(len(record.read_text().splitlines()), 3)
+            code, out, _ = self.fetch()
+            self.assertEqual((code, self.questions), (0, []))
+            self.assertNotIn("Max Planck", out)
+            shutil.rmtree(self.folder)
+
+    def test_only_new_terms_are_asked_for(self):
+        self.fetch("--accept-licences")
+        code, out, _ = self.fetch("--training")
+        self.assertEqual(code, 2)
+        self.assertIn("AniMer", out)
+        self.assertNotIn("Max Planck", out)
+        changed = dataclasses.replace(asset_terms.SMAL, conditions="ask first")
+        self.replace(asset_terms, "SMAL", changed)
+        code, out, _ = self.fetch()
+        self.assertEqual(code, 2)
+        self.assertIn("ask first", out)
+        self.assertNotIn("Mackenzie", out)
+
+    def test_consent_on_the_command_line_in_both_spellings(self):
+        for option in ("--accept-licences", "--accept-licenses"):
+            code, out, _ = self.fetch(option)
+            self.assertEqual((code, len(self.imported), self.questions), (0, 3, []))
+            self.assertIn("non-commercial scientific research only", out)
+            shutil.rmtree(self.folder)
 
 
 if __name__ == "__main__":
