@@ -55,7 +55,7 @@ class Tidy(unittest.TestCase):
         self.write("build/release/compile_commands.json", json.dumps([
             {"directory": str(self.root / "build/release"), "file": str(self.root / "a" / name),
              "command": " ".join(["/usr/bin/ccache", "/usr/bin/c++", *flags, "-c", str(self.root / "a" / name)])}
-            for name in ("x.cpp", "y.cpp")]))
+            for name in ("x.cpp", "y.cpp", "z.cpp")]))
         self.git("init", "--quiet", "--initial-branch=main")
         self.commit()
 
@@ -113,7 +113,7 @@ class Tidy(unittest.TestCase):
     def test_a_file_that_was_only_moved_is_left_out(self):
         self.git("mv", "a/y.cpp", "a/z.cpp")
         self.commit()
-        self.assertEqual(self.tidy("HEAD~1")[:1] + self.tidy("HEAD~1")[2:], (0, []))
+        self.assertEqual(self.tidy("HEAD~1"), (0, "", []))
 
     def test_what_was_clean_is_not_checked_again_until_a_header_changes(self):
         self.assertEqual(self.tidy("--all")[2], ["x.cpp", "y.cpp"])
