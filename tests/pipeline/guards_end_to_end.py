@@ -1,57 +1,25 @@
 """Guards, profiles and thresholds of single datasets on a small rendered world, by an untrained network.
 
-Run by ctest as: python guards_end_to_end.py PATH_OF_quadruped3d. What the guards measure is computed once more in
-numpy and PIL, from the shards and the body model.
+What the guards measure is computed once more in numpy and PIL, from the shards and the body model.
 """
 
-import csv
-import hashlib
 import json
 import pathlib
-import shutil
-import struct
-import subprocess
-import sys
-import tempfile
-import unittest
 import xml.etree.ElementTree
 
 import h5py
 import numpy as np
 from PIL import Image
 
-PROGRAM = sys.argv[1] if len(sys.argv) > 1 else "build/quadruped3d"
+from e2e import (Case, digests, file_sha256, kept, make_network, read_csv, read_safetensors, read_samples,
+                 render_world, run, run_json, verdicts, world_animal3d, world_body, world_superanimal, write_json)
+
 SIDE = 256
 LEGS = (7, 11, 17, 21)
 # Animal3D's keypoints and their mirror images: eyes, front and back paws, thighs, shoulders, knees, ears, mouth.
 PAIRS = ((0, 1), (3, 4), (5, 6), (8, 9), (10, 11), (12, 13), (14, 15), (16, 17), (20, 21), (22, 23))
 LOOSE = {"visible_min": 1, "pose_deviation_max": 1e6, "limb_factor_max": 1e6, "left_right_max": 1e9,
-         "mask_iou_min": 1e-12, "priors": "priors.safetensors"}
-
-
-def run(*arguments, expect=0):
-    result = subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=600)
-    if result.returncode != expect:
-        raise AssertionError(f"{arguments} ended with {result.returncode}, expected {expect}\n{result.stderr}")
-    return result
-
-
-def read_safetensors(path):
-    content = path.read_bytes()
-    length = struct.unpack("<Q", content[:8])[0]
-    tensors = {}
-    for name, entry in json.loads(content[8 : 8 + length]).items():
-        if name == "__metadata__":
-            continue
-        first, last = entry["data_offsets"]
-        dtype = {"F32": np.float32, "I32": np.int32, "I64": np.int64}[entry["dtype"]]
-        tensors[name] = np.frombuffer(content[8 + length + first : 8 + length + last], dtype).reshape(entry["shape"])
-    return tensors
-
-
-def digests(folder):
-    return {str(p.relative_to(folder)): hashlib.sha256(p.read_bytes()).hexdigest()
-            for p in sorted(folder.rglob("*")) if p.is_file()}
+         "mask_iou_min": 1e-12}
 
 
 def axis_angle(rotations):
@@ -114,82 +82,79 @@ class Body:
         return picture
 
 
-class Guards(unittest.TestCase):
+class Guards(Case):
     @classmethod
-    def setUpClass(cls):
-        cls.root = pathlib.Path(tempfile.mkdtemp(prefix="q3d_guards_"))
-        cls.world = cls.root / "world"
-        run("sample", "--out", cls.world, "--share", 0.03, "--pixels", 160, "--quiet")
-        run("init", "--size", "tiny", "--seed", 4, "--out", cls.root / "tiny.safetensors", "--priors",
-            cls.root / "priors.safetensors")
-        cls.out = cls.root / "out"
-        cls.config = cls.write("config", name="guarded", datasets=[
-            {"name": "superanimal", "format": "superanimal", "root": "world/superanimal_quadruped",
-             "annotations": "annotations/test.json", "images": "images", "split": "test"},
-            {"name": "animal3d", "format": "prima", "root": "world/animal3d", "annotations": "test.json",
-             "split": "test"}],
-            network={"checkpoint": "tiny.safetensors", "smal_asset": "world/assets/smal_synthetic.safetensors",
-                     "device": "cpu", "compute_threads": 1},
-            tta={"learning_rate": 1e-3, "iterations_max": 14}, shards={"unit_size": 8, "images": "reference"},
-            calibrate={"per_dataset": True})
-        cls.thresholds = cls.root / "thresholds.json"
-        cls.calibrated = run("calibrate", "--config", cls.config, "--out", cls.out, "--write", cls.thresholds, "--figure",
-                             cls.root / "figure.svg", "--quiet")
-        cls.build("paper")
-        cls.build("loose", guards=LOOSE)
-        cls.body = Body(read_safetensors(cls.world / "assets" / "smal_synthetic.safetensors"))
-        cls.priors = read_safetensors(cls.root / "priors.safetensors")
+    def prepare(cls):
+        world = cls.shared / "world"
+        render_world(world)
+        make_network(cls.shared / "tiny.safetensors", seed=4, priors=cls.shared / "priors.safetensors")
+        config = write_json(cls.shared / "config.json", {
+            "name": "guarded", "datasets": [world_superanimal(world), world_animal3d(world)],
+            "network": {"checkpoint": str(cls.shared / "tiny.safetensors"), "smal_asset": str(world_body(world)),
+                        "device": "cpu", "compute_threads": 1},
+            "tta": {"learning_rate": 1e-3, "iterations_max": 14},
+            "shards": {"unit_size": 8, "images": "reference"}, "calibrate": {"per_dataset": True}})
+        calibrated = run("calibrate", "--config", config, "--out", cls.shared / "out", "--write",
+                         cls.shared / "thresholds.json", "--figure", cls.shared / "figure.svg", "--quiet")
+        write_json(cls.shared / "calibrated.json", {"stdout": calibrated.stdout, "stderr": calibrated.stderr})
+        layers = {"paper": {}, "loose": {"guards": cls.with_priors(LOOSE)}}
+        built = {name: run_json("build", "--config", config, "--config", cls.shared / "thresholds.json", "--config",
+                                write_json(cls.shared / f"{name}.json", layer), "--out", cls.shared / "out", "--quiet")
+                 for name, layer in layers.items()}
+        write_json(cls.shared / "datasets.json", {name: summary["dataset"] for name, summary in built.items()})
 
     @classmethod
-    def tearDownClass(cls):
-        shutil.rmtree(cls.root)
+    def recall(cls):
+        cls.world = cls.shared / "world"
+        cls.config = cls.shared / "config.json"
+        cls.thresholds = cls.shared / "thresholds.json"
+        cls.body = Body(read_safetensors(world_body(cls.world)))
+        cls.priors = read_safetensors(cls.shared / "priors.safetensors")
+
+    def setUp(self):
+        super().setUp()
+        self.out = self.shared / "out"
+        built = json.loads((self.shared / "datasets.json").read_text())
+        self.datasets = {name: pathlib.Path(folder) for name, folder in built.items()}
 
     @classmethod
-    def write(cls, file_name, **config):
-        path = cls.root / f"{file_name}.json"
-        path.write_text(json.dumps(config))
-        return path
+    def with_priors(cls, guards):
+        """Guards that take their priors from the untrained network's file."""
+        return {**guards, "priors": str(cls.shared / "priors.safetensors")}
 
-    datasets = {}
+    def go_on_in_a_copy(self):
+        """Lets this test build on in its own copy of the shared output folder."""
+        self.out = self.copy_of("out")
+        self.datasets = {name: self.out / folder.name for name, folder in self.datasets.items()}
 
-    @classmethod
-    def build(cls, layer_name, out=None, threads=0, **layer):
-        path = cls.write(layer_name, **layer)
-        result = run("build", "--config", cls.config, "--config", cls.thresholds, "--config", path, "--out",
-                     out or cls.out, "--threads", threads, "--json", "--quiet")
-        summary = json.loads(result.stdout)
-        folder = pathlib.Path(summary["dataset"])
-        cls.datasets[layer_name] = folder
+    def layers(self, layer):
+        """Arguments: the config, the thresholds and one layer more."""
+        return ["--config", self.config, "--config", self.thresholds, "--config", layer]
+
+    def build(self, name, out=None, threads=0, **layer):
+        """The summary of a build with the layer over the config; the dataset's folder becomes self.datasets[name]."""
+        path = write_json(self.folder / f"{name}.json", layer)
+        summary = run_json("build", *self.layers(path), "--out", out or self.out, "--threads", threads, "--quiet")
+        self.datasets[name] = pathlib.Path(summary["dataset"])
         return summary
 
-    @classmethod
-    def stages(cls, stage):
-        return sorted(p.name for p in (cls.out / "stages").glob(f"{stage}-*"))
+    def stages(self, stage):
+        return sorted(p.name for p in (self.out / "stages").glob(f"{stage}-*"))
 
-    @classmethod
-    def verdicts(cls, name):
-        with open(cls.datasets[name] / "verdicts.csv", newline="") as file:
-            return {row["id"]: row for row in csv.DictReader(file)}
+    def verdicts(self, name):
+        return {row["id"]: row for row in verdicts(self.datasets[name])}
 
-    @classmethod
-    def labels(cls, name):
+    def labels(self, name):
         """id -> columns of every kept sample."""
-        labels = {}
-        for path in sorted((cls.datasets[name] / "shards").glob("*.h5")):
-            with h5py.File(path) as shard:
-                columns = {key: shard[key][:] for key in
-                           ("pose", "betas", "trans", "projected_2d", "keypoints_px", "keypoints_weight", "patch_box_px")}
-                for row, sample in enumerate(shard["id"][:]):
-                    labels[sample.decode()] = {key: column[row] for key, column in columns.items()}
-        return labels
+        columns = ("id", "pose", "betas", "trans", "projected_2d", "keypoints_px", "keypoints_weight", "patch_box_px")
+        return {sample["id"].decode(): sample for sample in read_samples(self.datasets[name], columns)}
 
-    @classmethod
-    def measures(cls, name):
+    def measures(self, name):
         """id -> measured numbers; the loose build keeps every measured label."""
-        key = json.loads((cls.datasets[name] / "dataset.json").read_text())["provenance"]["stage_keys"]["measure"]
-        ids = list(cls.verdicts(name))
+        key = json.loads((self.datasets[name] / "dataset.json").read_text())["provenance"]["stage_keys"]["measure"]
+        ids = list(self.verdicts(name))
         measured = {}
-        for unit, path in enumerate(sorted((cls.out / "stages" / f"measure-{key[:12]}").glob("*.h5"))):
+        for unit, path in enumerate(sorted((self.out / "stages" / f"measure-{key[:12]}").glob("*.h5"))):
             with h5py.File(path) as table:
                 names = ("visible", "pose_deviation", "limb_factor", "left_right", "mask_iou")
                 for row, sample in enumerate(table["sample"][:]):
@@ -200,11 +165,12 @@ class Guards(unittest.TestCase):
 
     def test_measures_are_those_of_the_kept_labels(self):
         labels, measured = self.labels("loose"), self.measures("loose")
-        kept = {i for i, row in self.verdicts("paper").items() if row["verdict"] in ("retained", "refined")}
-        self.assertEqual(set(measured), kept)
-        self.assertGreater(len(kept), 10)
-        self.assertLessEqual(set(labels), kept)
-        families = np.array([self.body.limbs(betas) for betas in self.priors["shape_prior_loss.mean_betas"].astype(float)])
+        kept_ids = {row["id"] for row in kept(verdicts(self.datasets["paper"]))}
+        self.assertEqual(set(measured), kept_ids)
+        self.assertGreater(len(kept_ids), 10)
+        self.assertLessEqual(set(labels), kept_ids)
+        mean_betas = self.priors["shape_prior_loss.mean_betas"].astype(float)
+        families = np.array([self.body.limbs(betas) for betas in mean_betas])
         mean, precs, use = (self.priors[f"pose_prior_loss.{name}"].astype(float)
                             for name in ("mean_pose", "precs", "use_index"))
         for sample, label in labels.items():
@@ -257,10 +223,11 @@ class Guards(unittest.TestCase):
     # --- what is kept
 
     def test_bounds_decide_by_the_measured_numbers(self):
+        self.go_on_in_a_copy()
         measured = self.measures("loose")
         bounds = {"pose_deviation_max": float(np.median([m["pose_deviation"] for m in measured.values()])),
                   "visible_min": int(np.median([m["visible"] for m in measured.values()]))}
-        summary = self.build("bounded", guards=LOOSE | bounds)
+        summary = self.build("bounded", guards=self.with_priors(LOOSE | bounds))
         paper, bounded = self.verdicts("paper"), self.verdicts("bounded")
         reasons = {"too_few_keypoints": 0, "pose_implausible": 0}
         for sample, row in bounded.items():
@@ -285,41 +252,40 @@ class Guards(unittest.TestCase):
         run("verify", self.datasets["bounded"])
 
     def test_a_changed_bound_makes_shards_alone_anew(self):
+        self.go_on_in_a_copy()
         stages = ("predict", "refine", "measure")
         before = {stage: self.stages(stage) for stage in stages}
         files = {stage: digests(self.out / "stages" / before[stage][0]) for stage in stages}
-        self.build("other_bound", guards=LOOSE | {"limb_factor_max": 1.3})
+        self.build("other_bound", guards=self.with_priors(LOOSE | {"limb_factor_max": 1.3}))
         self.assertEqual({stage: self.stages(stage) for stage in stages}, before)
         self.assertEqual({stage: digests(self.out / "stages" / before[stage][0]) for stage in stages}, files)
         self.assertNotEqual(self.datasets["other_bound"], self.datasets["loose"])
 
     def test_strict(self):
-        summary = self.build("strict", profile="strict", guards={"priors": "priors.safetensors"})
+        self.go_on_in_a_copy()
+        strict = {"profile": "strict", "guards": self.with_priors({})}
+        summary = self.build("strict", **strict)
         self.assertEqual(len(self.stages("predict")), 1)
         described = json.loads((self.datasets["strict"] / "dataset.json").read_text())
         self.assertEqual(described["profile"], "strict")
         shown = json.loads(run("config", "show").stdout)["profiles"]["strict"]["guards"]
         self.assertEqual({key: described["guards"][key] for key in shown}, shown)
         self.assertEqual(described["provenance"]["config"]["profile"], "strict")
-        self.assertEqual(described["provenance"]["priors_sha256"],
-                         hashlib.sha256((self.root / "priors.safetensors").read_bytes()).hexdigest())
+        self.assertEqual(described["provenance"]["priors_sha256"], file_sha256(self.shared / "priors.safetensors"))
         rows = self.verdicts("strict").values()
-        self.assertEqual(sum(row["verdict"] in ("retained", "refined") for row in rows),
-                         summary["retained"] + summary["refined"])
+        self.assertEqual(len(kept(rows)), summary["retained"] + summary["refined"])
         self.assertEqual(summary["retained"] + summary["refined"] + summary["discarded"] + summary["failed"], len(rows))
         for row in rows:
             if row["verdict"] == "refined":
                 self.assertGreater(int(row["best_iteration"]), 0, "the kept iterate helps the held-out points")
         run("verify", self.datasets["strict"])
-        one, two = self.root / "one", self.root / "two"
-        for out, threads in ((one, 1), (two, 4)):
-            self.build("again", out=out, threads=threads, profile="strict", guards={"priors": "priors.safetensors"})
+        for out, threads in (("one", 1), ("two", 4)):
+            self.build("again", out=self.folder / out, threads=threads, **strict)
             self.assertEqual(digests(self.datasets["again"]), digests(self.datasets["strict"]))
 
     def test_missing_priors_are_named(self):
-        path = self.write("no_priors", guards={"pose_deviation_max": 3})
-        stderr = run("build", "--config", self.config, "--config", self.thresholds, "--config", path, "--out",
-                     self.root / "no_priors", expect=1).stderr
+        path = write_json(self.folder / "no_priors.json", {"guards": {"pose_deviation_max": 3}})
+        stderr = run("build", *self.layers(path), "--out", self.folder / "no_priors", expect=1).stderr
         self.assertIn("guards.priors", stderr)
         self.assertIn("tiny.safetensors: no tensor named", stderr)
 
@@ -343,58 +309,51 @@ class Guards(unittest.TestCase):
     def test_a_dataset_without_thresholds_stops_the_build(self):
         given = json.loads(self.thresholds.read_text())
         del given["filter"]["datasets"]["superanimal"]
-        path = self.write("half", **given)
-        stderr = run("build", "--config", self.config, "--config", path, "--out", self.root / "half", expect=2).stderr
+        path = write_json(self.folder / "half.json", given)
+        stderr = run("build", "--config", self.config, "--config", path, "--out", self.folder / "half", expect=2).stderr
         self.assertIn("superanimal has no thresholds", stderr)
         self.assertIn("calibrate", stderr)
 
     def test_the_calibration_is_drawn_and_printed(self):
-        figure = xml.etree.ElementTree.parse(self.root / "figure.svg").getroot()
+        figure = xml.etree.ElementTree.parse(self.shared / "figure.svg").getroot()
         texts = "".join(element.text or "" for element in figure.iter())
         for words in ("animal3d", "superanimal", "tau_low", "tau_high", "yield"):
             self.assertIn(words, texts)
-        self.assertEqual(json.loads(self.calibrated.stdout), json.loads(self.thresholds.read_text()))
-        self.assertIn("<- tau_low", self.calibrated.stderr)
+        printed = json.loads((self.shared / "calibrated.json").read_text())
+        self.assertEqual(json.loads(printed["stdout"]), json.loads(self.thresholds.read_text()))
+        self.assertIn("<- tau_low", printed["stderr"])
 
     # --- one set of rules against another
 
     def test_labels_at_equal_yield(self):
-        self.build("few", guards=LOOSE | {"limb_factor_max": float(np.median(
-            [m["limb_factor"] for m in self.measures("loose").values()]))})
+        self.go_on_in_a_copy()
+        self.build("few", guards=self.with_priors(LOOSE | {"limb_factor_max": float(np.median(
+            [m["limb_factor"] for m in self.measures("loose").values()]))}))
         truth = self.world / "truth" / "superanimal_quadruped_test.json"
-        for name in ("paper", "few"):
-            run("evaluate-labels", "--config", self.config, "--config", self.thresholds, "--config",
-                self.root / f"{name}.json", "--out", self.out, "--truth", truth, "--report", self.root / f"{name}_labels",
-                "--quiet")
-        comparison = json.loads(run("compare-labels", "--before", self.root / "paper_labels", "--after",
-                                    self.root / "few_labels", "--json").stdout)
+        for layer in (self.shared / "paper.json", self.folder / "few.json"):
+            run("evaluate-labels", *self.layers(layer), "--out", self.out, "--truth", truth, "--report",
+                self.folder / f"{layer.stem}_labels", "--quiet")
+        before, after = self.folder / "paper_labels", self.folder / "few_labels"
+        comparison = run_json("compare-labels", "--before", before, "--after", after)
         pair = comparison["pairs"][0]
         self.assertLess(pair["kept_after"], pair["kept_before"])
         self.assertEqual(pair["equal_yield"], pair["kept_after"])
-
-        def kept(name):
-            with open(self.root / f"{name}_labels" / "labels.csv", newline="") as file:
-                return [row for row in csv.DictReader(file) if row["verdict"] in ("retained", "refined")]
-        before = sorted(kept("paper"), key=lambda row: (float(row["label_l_proj"]), row["id"]))[: pair["equal_yield"]]
+        rows_before, rows_after = (kept(read_csv(report / "labels.csv")) for report in (before, after))
+        rows_before.sort(key=lambda row: (float(row["label_l_proj"]), row["id"]))
+        rows_before = rows_before[: pair["equal_yield"]]
         row = next(r for r in comparison["rows"] if r["group"] == "equal yield" and r["metric"] == "pa_mpvpe_mm")
-        self.assertAlmostEqual(row["before"], np.mean([float(r["label_pa_mpvpe_mm"]) for r in before]), places=6)
-        self.assertAlmostEqual(row["after"], np.mean([float(r["label_pa_mpvpe_mm"]) for r in kept("few")]), places=6)
+        self.assertAlmostEqual(row["before"], np.mean([float(r["label_pa_mpvpe_mm"]) for r in rows_before]), places=6)
+        self.assertAlmostEqual(row["after"], np.mean([float(r["label_pa_mpvpe_mm"]) for r in rows_after]), places=6)
         self.assertLessEqual(row["low"], row["difference"])
         self.assertLessEqual(row["difference"], row["high"])
         both = next(r for r in comparison["rows"] if r["group"] == "kept by both" and r["metric"] == "pa_mpjpe_mm")
         self.assertEqual((both["low"], both["high"]), (0, 0), "the labels are the same; the choice differs")
-        run("compare-labels", "--before", self.root / "paper_labels", "--after", self.root / "few_labels",
-            self.root / "few_labels", expect=2)
+        run("compare-labels", "--before", before, "--after", after, after, expect=2)
 
     def test_the_shown_config_is_the_same_config(self):
-        shown = run("config", "show", "--config", self.config, "--config", self.thresholds, "--config",
-                    self.root / "loose.json").stdout
-        path = self.root / "shown.json"
-        path.write_text(shown)
-        summary = json.loads(run("build", "--config", path, "--out", self.out, "--json", "--quiet").stdout)
+        self.go_on_in_a_copy()
+        path = self.folder / "shown.json"
+        path.write_text(run("config", "show", *self.layers(self.shared / "loose.json")).stdout)
+        summary = run_json("build", "--config", path, "--out", self.out, "--quiet")
         self.assertTrue(summary["up_to_date"])
         self.assertEqual(summary["dataset"], str(self.datasets["loose"]))
-
-
-if __name__ == "__main__":
-    unittest.main(argv=[sys.argv[0], *sys.argv[2:]], verbosity=1)

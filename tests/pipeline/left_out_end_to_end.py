@@ -1,26 +1,14 @@
-"""What a user leaves out, and what the program tells of one sample: build --veto and explain, as they are run.
-
-Run by ctest as: python left_out_end_to_end.py PATH_OF_quadruped3d.
-"""
+"""What a user leaves out, and what the program tells of one sample: build --veto and explain, as they are run."""
 
 import csv
 import json
-import pathlib
 import shutil
-import sys
-import tempfile
-import unittest
 
-import h5py
 import numpy as np
 from PIL import Image
 
-from end_to_end import Scene, run, write_annotations
-
-
-def verdicts(dataset):
-    with open(dataset / "verdicts.csv", newline="") as file:
-        return list(csv.DictReader(file))
+from e2e import (Case, Scene, latest, prima_dataset, read_csv, read_samples, run, run_json, smooth_picture, stamps,
+                 verdicts, write_annotations, write_json)
 
 
 def of(rows, verdict):
@@ -33,43 +21,39 @@ def square_box(box):
     return (2 * x + w) // 2, (2 * y + h) // 2, max(w, h)
 
 
-def smooth_picture(seed, size=(200, 150)):
-    """Blobs of colour: structure at all scales, as photographs have, where noise has none that survives resizing."""
-    generator = np.random.default_rng(1000 + seed)
-    coarse = Image.fromarray(generator.integers(0, 255, (9, 12, 3), dtype=np.uint8)).resize(size, Image.Resampling.BICUBIC)
-    fine = Image.fromarray(generator.integers(0, 255, (36, 48, 3), dtype=np.uint8)).resize(size, Image.Resampling.BICUBIC)
-    return Image.blend(coarse, fine, 0.3)
-
-
-class LeftOut(unittest.TestCase):
+class LeftOut(Case):
     @classmethod
-    def setUpClass(cls):
-        cls.folder = tempfile.mkdtemp(prefix="q3d_left_out_")
-        cls.scene = Scene(cls.folder)
-        cls.scene.build("out")
-        cls.dataset = cls.scene.latest("out")
+    def prepare(cls):
+        Scene.make(cls.shared).build("out")
+
+    @classmethod
+    def recall(cls):
+        cls.dataset = latest(cls.shared / "out")
         cls.rows = verdicts(cls.dataset)
 
-    @classmethod
-    def tearDownClass(cls):
-        shutil.rmtree(cls.folder)
+    def setUp(self):
+        super().setUp()
+        self.scene = Scene(self.shared, self.folder)
 
     def explain(self, sample, *more, dataset=None, expect=0):
-        return run("explain", dataset or self.scene.root / "out", sample, *more, expect=expect)
+        return run("explain", dataset or self.shared / "out", sample, *more, expect=expect)
 
     # --- veto
 
     def test_a_vetoed_sample_is_discarded_and_nothing_else_changes(self):
         chosen = [of(self.rows, "retained")[0], of(self.rows, "refined")[0], of(self.rows, "discarded")[0]]
-        veto = self.scene.root / "veto.txt"
+        veto = self.folder / "veto.txt"
         veto.write_text("# seen by eye\n\n" + f"{chosen[0]['id']}\tthe tail is bent\n" +
                         "".join(f"{row['id']}\n" for row in chosen[1:]) + "drawn/train/nothing.png#99\n")
-        out = self.scene.root / "out"
-        stamps = {p: p.stat().st_mtime_ns for p in out.glob("stages/*/unit-*.h5") if "shards" not in str(p)}
+        out = self.copy_of("out")
+        first = self.scene.latest("out")
+        tables = [p for p in out.glob("stages/*/unit-*.h5") if not p.parent.name.startswith("shards-")]
+        before = stamps(tables)
+        self.assertTrue(before)
         result = self.scene.build("out", "--json", "--veto", veto)
         self.assertIn("veto.txt: 1 of its 4 ids are no candidate's", result.stderr)
         vetoed = self.scene.latest("out")
-        self.assertNotEqual(vetoed, self.dataset)
+        self.assertNotEqual(vetoed, first)
         after = {row["id"]: row for row in verdicts(vetoed)}
         names = {row["id"] for row in chosen}
         for row in self.rows:
@@ -82,41 +66,38 @@ class LeftOut(unittest.TestCase):
                 for key in ("verdict", "reason", "initial_error", "final_error", "gain"):
                     self.assertEqual(new[key], row[key])
         # Neither predicted nor adapted anew.
-        for path, stamp in stamps.items():
-            self.assertEqual(path.stat().st_mtime_ns, stamp)
+        self.assertEqual(stamps(tables), before)
         manifest = json.loads((vetoed / "dataset.json").read_text())
         self.assertEqual(manifest["counts"]["retained"], len(of(self.rows, "retained")) - 1)
         self.assertEqual(manifest["statistics"]["reasons"]["vetoed"], 3)
         self.assertEqual((manifest["provenance"]["veto"]["ids"], manifest["provenance"]["veto"]["matched"]), (4, 3))
-        for shard in (vetoed / "shards").glob("*.h5"):
-            with h5py.File(shard) as file:
-                self.assertFalse(names & {name.decode() for name in file["id"][:]})
+        self.assertFalse(names & {sample["id"].decode() for sample in read_samples(vetoed, ["id"])})
         run("verify", vetoed)
         self.assertIn("veto list: the tail is bent", self.explain(chosen[0]["id"], dataset=vetoed).stdout)
         # Without the list the first dataset is there as it was.
         summary = json.loads(self.scene.build("out", "--json").stdout)
         self.assertTrue(summary["up_to_date"])
-        self.assertEqual(self.scene.latest("out"), self.dataset)
+        self.assertEqual(self.scene.latest("out"), first)
 
     def test_a_veto_in_the_config_is_the_same(self):
-        (self.scene.root / "list.txt").write_text(self.rows[0]["id"] + "\n")
+        (self.folder / "list.txt").write_text(self.rows[0]["id"] + "\n")
         config = self.scene.write_config("with_veto.json", veto="list.txt")
         self.scene.build("config_veto", config=config)
         row = verdicts(self.scene.latest("config_veto"))[0]
         self.assertEqual(row["reason"], "vetoed")
 
     def test_a_list_that_is_none_is_a_usage_error(self):
-        bad = self.scene.root / "bad.txt"
+        bad = self.folder / "bad.txt"
         bad.write_text("drawn/train/a.png#1\nwolf_1.jpg\n")
         self.assertIn("line 2", self.scene.build("bad_veto", "--veto", bad, expect=2).stderr)
-        self.scene.build("bad_veto", "--veto", self.scene.root / "nowhere.txt", expect=2)
+        self.scene.build("bad_veto", "--veto", self.folder / "nowhere.txt", expect=2)
 
     # --- leakage
 
     def plant(self):
         """A test set that holds pictures of the pool: as they are, under an ImageNet name, resized, recompressed and
         mirrored; and one picture of its own. The pool's pictures 1 and 2 are copies of each other."""
-        root = self.scene.root / "planted"
+        root = self.folder / "planted"
         images = root / "images"
         images.mkdir(parents=True)
         pictures = [smooth_picture(seed) for seed in range(9)]
@@ -136,16 +117,15 @@ class LeftOut(unittest.TestCase):
         write_annotations(root, [{**record, "img_path": f"images/{n}", "bbox": [4, 4, 60, 50]} for n in names])
         write_annotations(root, [{**record, "img_path": f"images/{n}", "bbox": [4, 4, 60, 50]} for n in test],
                           "test.json")
-        pool = {"name": "pool", "format": "prima", "root": "planted", "annotations": "train.json", "split": "train"}
-        held_out = {"name": "held", "format": "prima", "root": "planted", "annotations": "test.json", "split": "test"}
+        pool = prima_dataset("planted", "pool")
+        held_out = prima_dataset("planted", "held", "test.json", "test")
         return self.scene.write_config("planted.json", datasets=[pool], leakage={"test_sets": [held_out]})
 
     def test_planted_copies_are_found_listed_and_left_out(self):
         config = self.plant()
-        out = self.scene.root / "planted_out"
-        summary = json.loads(run("leakage", "--config", config, "--out", out, "--json").stdout)
-        with open(out / "leaks.csv", newline="") as file:
-            leaks = {row["id"].split("/")[-1].split("#")[0]: row for row in csv.DictReader(file)}
+        out = self.folder / "planted_out"
+        summary = run_json("leakage", "--config", config, "--out", out)
+        leaks = {row["id"].split("/")[-1].split("#")[0]: row for row in read_csv(out / "leaks.csv")}
         expected = {"p3.png": ("same.png", "same file"), "n02114367_52_777.png": ("n02114367_52.JPEG", "same origin"),
                     "p4.png": ("small.jpg", "looks alike"), "p5.png": ("squeezed.jpg", "looks alike"),
                     "p6.png": ("mirror.png", "looks alike"), "p7.png": ("all.jpg", "looks alike")}
@@ -156,8 +136,7 @@ class LeftOut(unittest.TestCase):
         self.assertIn("mirrored", leaks["p6.png"]["detail"])
         self.assertIn("mirrored", leaks["p7.png"]["detail"])
         self.assertEqual((summary["leaks"], summary["groups"], summary["pictures_in_groups"]), (6, 1, 2))
-        with open(out / "duplicates.csv", newline="") as file:
-            twins = [row["id"].split("/")[-1] for row in csv.DictReader(file)]
+        twins = [row["id"].split("/")[-1] for row in read_csv(out / "duplicates.csv")]
         self.assertEqual(twins, ["p1.png#1", "p2.png#2"])
         lists = {name: (out / name).read_bytes() for name in ("leaks.csv", "duplicates.csv", "leakage.json")}
         self.assertEqual((out / "leakage.html").read_text().count("<img "), 6 * 2 + 2)
@@ -189,19 +168,20 @@ class LeftOut(unittest.TestCase):
 
     def test_a_build_takes_what_curate_chose(self):
         record = self.scene.records[0]
+        data = self.folder / "data"
+        (data / "images").mkdir(parents=True)
         for split, species in (("train", ["horse"] * 9 + ["wolf"] * 2 + ["skunk"]), ("test", ["wolf", "horse"])):
             names = [f"images/{i:012}_{name}.png" for i, name in enumerate(species)]
             for i, name in enumerate(names):
-                smooth_picture(100 + i).save(self.scene.data / name)
-            write_annotations(self.scene.data, [{**record, "img_path": name, "bbox": [4, 4, 60, 50]} for name in names],
+                smooth_picture(100 + i).save(data / name)
+            write_annotations(data, [{**record, "img_path": name, "bbox": [4, 4, 60, 50]} for name in names],
                               f"whole_{split}.json")
-        sets = [{"name": "whole", "format": "prima", "root": "data", "annotations": f"whole_{split}.json",
-                 "split": split} for split in ("train", "test")]
-        rule = self.scene.root / "rule.json"
-        rule.write_text(json.dumps({"name": "half", "datasets": sets, "pictures": {"train": 6, "test": 2},
-                                    "species": {"horse": ["horse"], "wolf": ["wolf"]}}))
-        out = self.scene.root / "curation"
-        summary = json.loads(run("curate", "--config", rule, "--out", out, "--json").stdout)
+        sets = [prima_dataset("data", "whole", f"whole_{split}.json", split) for split in ("train", "test")]
+        rule = write_json(self.folder / "rule.json",
+                          {"name": "half", "datasets": sets, "pictures": {"train": 6, "test": 2},
+                           "species": {"horse": ["horse"], "wolf": ["wolf"]}})
+        out = self.folder / "curation"
+        summary = run_json("curate", "--config", rule, "--out", out)
         self.assertEqual(summary["verdicts"]["train"], {"chosen": 6, "not_drawn": 5, "species_not_listed": 1,
                                                         "species_unknown": 0})
         self.assertEqual(summary["chosen"], {"horse": {"test": 1, "train": 4}, "wolf": {"test": 1, "train": 2}})
@@ -242,7 +222,7 @@ class LeftOut(unittest.TestCase):
                     self.assertEqual(len(story["curve"]), int(row["iterations"]) + 1)
 
     def test_the_sentence_names_the_number_that_decided(self):
-        limits = json.loads(self.scene.thresholds.read_text())["filter"]
+        limits = self.scene.limits
         retained = self.explain(of(self.rows, "retained")[0]["id"]).stdout
         self.assertIn(f"lies below tau_low = {limits['tau_low']:.4f}", retained)
         refined = self.explain(of(self.rows, "refined")[0]["id"]).stdout
@@ -253,7 +233,7 @@ class LeftOut(unittest.TestCase):
         self.assertIn(f"reaches tau_high = {limits['tau_high']:.4f}", self.explain(far["id"]).stdout)
 
     def test_a_dataset_away_from_its_stages_tells_what_it_holds(self):
-        copy = pathlib.Path(self.folder) / "copy" / "dataset"
+        copy = self.folder / "copy" / "dataset"
         shutil.copytree(self.dataset, copy)
         kept = json.loads(self.explain(of(self.rows, "refined")[0]["id"], "--json", dataset=copy).stdout)
         self.assertIn("predictions", kept["missing"][0])
@@ -267,7 +247,3 @@ class LeftOut(unittest.TestCase):
         result = self.explain(sample.replace("#5", "#6"), expect=1)
         self.assertIn("the nearest is drawn/train/images/p00", result.stderr)
         self.assertIn("Examples", run("explain", "--help").stdout)
-
-
-if __name__ == "__main__":
-    unittest.main(argv=[sys.argv[0], *sys.argv[2:]], verbosity=1)

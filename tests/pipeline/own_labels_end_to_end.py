@@ -1,23 +1,15 @@
-"""docs/own-labels.md, done: its files are cut out of the page, its commands are run, and the shards are read.
-
-Run by ctest as: python own_labels_end_to_end.py PATH_OF_quadruped3d.
-"""
+"""docs/own-labels.md, done: its files are cut out of the page, its commands are run, and the shards are read."""
 
 import csv
 import io
 import json
 import pathlib
 import shlex
-import shutil
-import sys
-import tempfile
-import unittest
 
-import h5py
 import numpy as np
 from PIL import Image
 
-from end_to_end import run
+from e2e import Case, read_samples, run, verdicts, write_json
 
 PAGE = pathlib.Path(__file__).parents[2] / "docs" / "own-labels.md"
 # Animal3D's order.
@@ -53,44 +45,37 @@ def commands_of_page():
             for line in text.splitlines()]
 
 
-class OwnLabels(unittest.TestCase):
+class OwnLabels(Case):
     @classmethod
-    def setUpClass(cls):
-        cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="q3d_own_labels_"))
-        cls.files = files_of_page()
-        goats = cls.folder / "goats"
-        for name, content in cls.files.items():
+    def prepare(cls):
+        goats = cls.shared / "goats"
+        for name, content in files_of_page().items():
             (goats / name).parent.mkdir(parents=True, exist_ok=True)
             (goats / name).write_text(content)
         generator = np.random.default_rng(3)
         for name in ("labeled-data/walk/img0001.png", "labeled-data/walk/img0002.png", "frames/field.png"):
             (goats / name).parent.mkdir(parents=True, exist_ok=True)
             Image.fromarray(generator.integers(0, 255, (150, 200, 3), dtype=np.uint8)).save(goats / name)
-        cls.results = [run(*words[1:], cwd=cls.folder) for words in commands_of_page()]
-        cls.dataset = cls.folder / "out" / "latest"
-        cls.samples = {}
-        for path in sorted(cls.dataset.glob("shards/*.h5")):
-            with h5py.File(path) as shard:
-                for row, name in enumerate(shard["id"][:]):
-                    cls.samples[name.decode()] = {key: shard[key][row] for key in shard if key != "crop" and
-                                                  len(shard[key]) == len(shard["id"])}
+        results = [run(*words[1:], cwd=cls.shared) for words in commands_of_page()]
+        write_json(cls.shared / "exit_codes.json", [result.returncode for result in results])
 
     @classmethod
-    def tearDownClass(cls):
-        shutil.rmtree(cls.folder)
+    def recall(cls):
+        cls.files = files_of_page()
+        cls.dataset = cls.shared / "out" / "latest"
+        cls.samples = {sample["id"].decode(): sample for sample in read_samples(cls.dataset)}
 
     def test_the_page_has_its_files(self):
         self.assertEqual(set(self.files), {"labeled-data/walk/CollectedData_Ada.csv", "field.json", "goats.json",
                                            "build.json"})
-        self.assertEqual([result.returncode for result in self.results], [0, 0])
+        self.assertEqual(json.loads((self.shared / "exit_codes.json").read_text()), [0, 0])
 
     def test_every_animal_is_kept(self):
         self.assertEqual(list(self.samples), [
             "walk/train/labeled-data/walk/img0001.png#0", "walk/train/labeled-data/walk/img0002.png#0",
             "field/train/field.png#7", "field/train/field.png#8"])
-        with open(self.dataset / "verdicts.csv", newline="") as file:
-            for row in csv.DictReader(file):
-                self.assertEqual((row["verdict"], row["species"], row["family"]), ("retained", "goat", "bovidae"))
+        for row in verdicts(self.dataset):
+            self.assertEqual((row["verdict"], row["species"], row["family"]), ("retained", "goat", "bovidae"))
 
     def test_points_are_the_files_own(self):
         topology = json.loads(self.files["goats.json"])
@@ -123,7 +108,3 @@ class OwnLabels(unittest.TestCase):
         # x 30 to 150, y 48 to 122; 120 is the longer side, so 12 px on every side.
         np.testing.assert_allclose(self.samples["walk/train/labeled-data/walk/img0001.png#0"]["box_xywh_px"],
                                    [18, 36, 144, 98])
-
-
-if __name__ == "__main__":
-    unittest.main(argv=[sys.argv[0], *sys.argv[2:]], verbosity=1)

@@ -1,86 +1,67 @@
 """Training on several ranks as a user starts it, under torchrun: equal to one process, resumed by any number, ended
-together.
-
-Run by ctest as: python ranks_end_to_end.py PATH_OF_quadruped3d. Every dataset here is made by the test itself.
-"""
+together."""
 
 import json
 import os
 import pathlib
 import shutil
 import signal
-import struct
 import subprocess
 import sys
-import tempfile
-import time
-import unittest
 
 import numpy as np
 
-from end_to_end import PROGRAM, draw_pictures, run, write_annotations
-from roles_end_to_end import give_bodies
+from e2e import (LIMIT_S, Case, draw_pictures, give_bodies, make_network, prima_dataset, program, read_safetensors,
+                 run, split_safetensors, wait_until, write_annotations, write_json, write_safetensors)
 
 STEPS = 3
 
 
-def tensors(path):
-    """Every float32 tensor of a safetensors file, flat, by name."""
-    data = path.read_bytes()
-    size, = struct.unpack("<Q", data[:8])
-    header = json.loads(data[8 : 8 + size])
-    return {name: np.frombuffer(data, np.float32, (entry["data_offsets"][1] - entry["data_offsets"][0]) // 4,
-                                8 + size + entry["data_offsets"][0]).astype(float)
-            for name, entry in header.items() if name != "__metadata__"}
+def flat_tensors(path):
+    """Every tensor of a safetensors file as float64, flat, by name."""
+    return {name: tensor.astype(float).reshape(-1) for name, tensor in read_safetensors(path).items()}
 
 
 def without_dropout(path):
     """Ranks draw dropout from different streams, so with it they equal one process in the mean only."""
-    data = path.read_bytes()
-    size, = struct.unpack("<Q", data[:8])
-    header = json.loads(data[8 : 8 + size])
+    header, data = split_safetensors(path)
     config = json.loads(header["__metadata__"]["prima_config"])
     config.update(dropout=0.0, drop_path=0.0)
     header["__metadata__"]["prima_config"] = json.dumps(config)
-    text = json.dumps(header).encode()
-    path.write_bytes(struct.pack("<Q", len(text)) + text + data[8 + size :])
+    write_safetensors(path, header, data)
 
 
-class Ranks(unittest.TestCase):
+class Ranks(Case):
     @classmethod
-    def setUpClass(cls):
-        cls.root = pathlib.Path(tempfile.mkdtemp(prefix="q3d_ranks_"))
-        run("init", "--size", "tiny", "--out", cls.root / "initial.safetensors", "--smal-asset",
-            cls.root / "smal.safetensors", "--priors", cls.root / "priors.safetensors")
-        shutil.copy(cls.root / "initial.safetensors", cls.root / "with_dropout.safetensors")
-        without_dropout(cls.root / "initial.safetensors")
-        write_annotations(cls.root / "data", give_bodies(draw_pictures(cls.root / "data", 12)))
+    def prepare(cls):
+        initial = cls.shared / "initial.safetensors"
+        make_network(initial, body=cls.shared / "smal.safetensors", priors=cls.shared / "priors.safetensors")
+        shutil.copy(initial, cls.shared / "with_dropout.safetensors")
+        without_dropout(initial)
+        data = cls.shared / "data"
+        write_annotations(data, give_bodies(draw_pictures(data, 12)))
         for role in ("truth", "2d_only"):  # a batch holds samples with and without bodies
-            config = {"name": "packed", "shards": {"unit_size": 6},
-                      "datasets": [{"name": role, "format": "prima", "root": "data", "annotations": "train.json",
-                                    "role": role}]}
-            (cls.root / f"{role}.json").write_text(json.dumps(config))
-            run("build", "--config", cls.root / f"{role}.json", "--out", cls.root / role)
-        cls.config = cls.write_config("train")
+            config = write_json(cls.shared / f"{role}.json", {"name": "packed", "shards": {"unit_size": 6},
+                                                              "datasets": [prima_dataset(data, role, role=role)]})
+            run("build", "--config", config, "--out", cls.shared / role)
 
-    @classmethod
-    def tearDownClass(cls):
-        shutil.rmtree(cls.root)
+    def setUp(self):
+        super().setUp()
+        self.config = self.write_config("train")
 
-    @classmethod
-    def write_config(cls, name, initial="initial.safetensors", **changes):
-        config = {"network": {"initial": initial, "smal_asset": "smal.safetensors",
-                              "priors": "priors.safetensors", "device": "cpu", "compute_threads": 1},
-                  "pools": {role: {"shards": [f"{role}/latest"]} for role in ("truth", "2d_only")},
-                  "stages": {"1": [{"name": "joint", "pools": ["truth", "2d_only"], "steps": STEPS,
-                                    "learning_rate": 1e-3, "adversarial": True}]},
-                  "batch": 4, "log_every": 1, "checkpoint_every": 1000, **changes}
-        path = cls.root / f"{name}.json"
-        path.write_text(json.dumps(config))
-        return path
+    def write_config(self, name, initial="initial.safetensors", **changes):
+        network = {"initial": initial, "smal_asset": "smal.safetensors", "priors": "priors.safetensors"}
+        return write_json(self.folder / f"{name}.json", {
+            "network": {**{key: str(self.shared / file) for key, file in network.items()}, "device": "cpu",
+                        "compute_threads": 1},
+            "pools": {role: {"shards": [str(self.shared / role / "latest")]} for role in ("truth", "2d_only")},
+            "stages": {"1": [{"name": "joint", "pools": ["truth", "2d_only"], "steps": STEPS, "learning_rate": 1e-3,
+                              "adversarial": True}]},
+            "batch": 4, "log_every": 1, "checkpoint_every": 1000, **changes})
 
-    def command(self, out, *more, config=None):
-        return [PROGRAM, "train", "--config", str(config or self.config), "--stage", "1", "--out", str(self.root / out),
+    def train(self, out, *more, config=None):
+        """Arguments of a training run into folder/out."""
+        return ["train", "--config", str(config or self.config), "--stage", "1", "--out", str(self.folder / out),
                 "--json", *map(str, more)]
 
     def launcher(self, ranks=2):
@@ -91,26 +72,30 @@ class Ranks(unittest.TestCase):
         # A host's own name need not resolve where tests run.
         return {**os.environ, "GLOO_SOCKET_IFNAME": "lo"}
 
+    def launch(self, words):
+        return subprocess.run([*self.launcher(), *words], capture_output=True, text=True, timeout=LIMIT_S,
+                              env=self.environment())
+
     def torchrun(self, *arguments, expect=0, **options):
-        result = subprocess.run([*self.launcher(), *self.command(*arguments, **options)], capture_output=True,
-                                text=True, timeout=300, env=self.environment())
+        result = self.launch([program(), *self.train(*arguments, **options)])
         self.assertEqual(result.returncode == 0, expect == 0, result.stderr)
         return result
 
     def test_two_ranks_train_as_one_process_and_one_goes_on_where_two_stopped(self):
-        run(*self.command("one")[1:])
+        run(*self.train("one"))
         first = json.loads(self.torchrun("two", "--max-steps", 2).stdout)  # one summary, not two
         self.assertEqual((first["steps_done"], first["finished"]), (2, False))
-        run(*self.command("two")[1:])
-        lines = [[json.loads(line) for line in (self.root / out / "log.jsonl").read_text().splitlines()]
+        run(*self.train("two"))
+        lines = [[json.loads(line) for line in (self.folder / out / "log.jsonl").read_text().splitlines()]
                  for out in ("one", "two")]
         self.assertEqual([line["step"] for line in lines[1]], list(range(1, STEPS + 1)))
         for name, value in lines[0][0]["terms"].items():
             np.testing.assert_allclose(lines[1][0]["terms"][name], value, rtol=1e-4, atol=1e-7, err_msg=name)
         np.testing.assert_allclose(lines[1][0]["gradient_norm"], lines[0][0]["gradient_norm"], rtol=1e-4)
         # AdamW moves an element whose gradient is mere rounding by a whole step, hence the norm of all.
-        start, one, two = (tensors(self.root / name) for name in ("initial.safetensors", "one/model.safetensors",
-                                                                  "two/model.safetensors"))
+        start, one, two = (flat_tensors(path) for path in (self.shared / "initial.safetensors",
+                                                           self.folder / "one/model.safetensors",
+                                                           self.folder / "two/model.safetensors"))
         moved = sum(np.sum((one[name] - start[name]) ** 2) for name in one) ** 0.5
         apart = sum(np.sum((one[name] - two[name]) ** 2) for name in one) ** 0.5
         self.assertGreater(moved, 0.1)
@@ -122,17 +107,17 @@ class Ranks(unittest.TestCase):
         self.torchrun("stopped", "--max-steps", 1, config=config)
         self.torchrun("stopped", config=config)
         for name in ("model.safetensors", "state.safetensors"):
-            self.assertEqual((self.root / "straight" / name).read_bytes(), (self.root / "stopped" / name).read_bytes())
+            self.assertEqual((self.folder / "straight" / name).read_bytes(),
+                             (self.folder / "stopped" / name).read_bytes())
 
     def test_ranks_of_different_configurations_are_refused(self):
         for rank in range(2):
             self.write_config(f"rank{rank}", seed=rank)
-        words = self.command("mixed", config=self.root / "rank$RANK.json")
-        result = subprocess.run([*self.launcher(), "bash", "-c", "exec " + " ".join(words)], capture_output=True,
-                                text=True, timeout=300, env=self.environment())
+        words = [program(), *self.train("mixed", config=self.folder / "rank$RANK.json")]
+        result = self.launch(["bash", "-c", "exec " + " ".join(f'"{word}"' for word in words)])
         self.assertNotEqual(result.returncode, 0)
         self.assertIn("rank 1 was started with another configuration", result.stderr)
-        self.assertFalse((self.root / "mixed/state.safetensors").exists())
+        self.assertFalse((self.folder / "mixed/state.safetensors").exists())
 
     def test_a_batch_that_cannot_be_shared_is_refused(self):
         result = self.torchrun("odd", config=self.write_config("odd", batch=3), expect=1)
@@ -143,38 +128,43 @@ class Ranks(unittest.TestCase):
         steps = [{"name": "long", "pools": ["truth"], "steps": 100000}]
         config = self.write_config("long", stages={"1": steps})
         self.assertGreaterEqual(self.steps_before_signal("long", config, lambda launcher: self.rank(launcher, 1)), 2)
-        saved = (self.root / "long/state.safetensors").read_bytes()
+        saved = (self.folder / "long/state.safetensors").read_bytes()
         self.assertGreaterEqual(self.steps_before_signal("long", config, lambda launcher: launcher), 4)
-        self.assertNotEqual(saved, (self.root / "long/state.safetensors").read_bytes())
+        self.assertNotEqual(saved, (self.folder / "long/state.safetensors").read_bytes())
 
     def steps_before_signal(self, out, config, target):
         """Runs until the log has two more lines, interrupts the process that target(launcher's id) names, and returns
         how many steps the log then holds."""
-        log = self.root / out / "log.jsonl"
+        log = self.folder / out / "log.jsonl"
         lines = lambda: log.read_text().count("\n") if log.exists() else 0
         wanted = lines() + 2
-        process = subprocess.Popen([*self.launcher(), *self.command(out, config=config)], text=True,
-                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=self.environment())
-        deadline = time.monotonic() + 240
-        while lines() < wanted:
-            self.assertLess(time.monotonic(), deadline)
+        process = subprocess.Popen([*self.launcher(), program(), *self.train(out, config=config)], text=True,
+                                   stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=self.environment())
+        self.addCleanup(self.end, process)
+
+        def has_lines():
             self.assertIsNone(process.poll())
-            time.sleep(0.2)
+            return lines() >= wanted
+
+        wait_until(has_lines, f"{wanted} lines in {log}")
         os.kill(target(process.pid), signal.SIGINT)
-        _, errors = process.communicate(timeout=120)
+        _, errors = process.communicate(timeout=LIMIT_S)
         self.assertNotEqual(process.returncode, 0)
         self.assertIn("run the same command to continue", errors)
-        self.assertTrue((self.root / out / "state.safetensors").exists(), errors)
+        self.assertTrue((self.folder / out / "state.safetensors").exists(), errors)
         return lines()
+
+    @staticmethod
+    def end(process):
+        """Ends the launcher, which ends its ranks, where a failed assertion left them running."""
+        process.terminate()
+        process.wait(LIMIT_S)
+        process.stderr.close()
 
     @staticmethod
     def rank(launcher, number):
         """The process id of a rank."""
         children = pathlib.Path(f"/proc/{launcher}/task/{launcher}/children").read_text().split()
         return next(int(child) for child in children if
-                    pathlib.Path(f"/proc/{child}/cmdline").read_bytes().startswith(PROGRAM.encode()) and
+                    pathlib.Path(f"/proc/{child}/cmdline").read_bytes().startswith(program().encode()) and
                     f"\0RANK={number}\0".encode() in pathlib.Path(f"/proc/{child}/environ").read_bytes())
-
-
-if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1], verbosity=2)

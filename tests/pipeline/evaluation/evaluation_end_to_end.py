@@ -1,35 +1,18 @@
 """`evaluate`, `compare` and `evaluate-labels` on a small rendered world, their numbers once more in numpy.
 
-Run by ctest as: python evaluation_end_to_end.py PATH_OF_quadruped3d. Predictions are read from a build's shards.
+Predictions are read from a build's shards.
 """
 
-import csv
 import json
-import pathlib
 import shutil
-import subprocess
-import sys
-import tempfile
-import unittest
 
-import h5py
 import numpy as np
 from PIL import Image
 
-PROGRAM = sys.argv[1] if len(sys.argv) > 1 else "build/quadruped3d"
+from e2e import (Case, latest, make_network, prima_dataset, read_csv, read_samples, render_world, run, run_json,
+                 world_animal3d, world_body, world_superanimal, write_json)
+
 SIDE = 256
-
-
-def run(*arguments, expect=0):
-    result = subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=300)
-    if result.returncode != expect:
-        raise AssertionError(f"{arguments} ended with {result.returncode}, expected {expect}\n{result.stderr}")
-    return result
-
-
-def rows_of(path):
-    with open(path, newline="") as file:
-        return list(csv.DictReader(file))
 
 
 def number(text):
@@ -65,37 +48,41 @@ def mask_area_px(path, centre, side):
     return np.asarray(mask, float).sum() / 255
 
 
-class Evaluation(unittest.TestCase):
+def write_config(shared, path, **changes):
+    """A config for the untrained network in the folder `shared`."""
+    network = {"checkpoint": str(shared / "tiny.safetensors"), "smal_asset": str(world_body(shared / "world")),
+               "device": "cpu", "compute_threads": 1}
+    return write_json(path, {"network": network, "tta": {"learning_rate": 1e-3}, **changes})
+
+
+def evaluate(config, out, threads):
+    run("evaluate", "--config", config, "--out", out, "--tta", 3, "--visible", 0.5, "--tta-curve", "0,2", "--threads",
+        threads)
+
+
+class Evaluation(Case):
     @classmethod
-    def setUpClass(cls):
-        cls.root = pathlib.Path(tempfile.mkdtemp(prefix="q3d_evaluation_"))
-        cls.world = cls.root / "world"
-        run("sample", "--out", cls.world, "--share", 0.03, "--pixels", 160, "--quiet")
-        run("init", "--size", "tiny", "--seed", 4, "--out", cls.root / "tiny.safetensors")
-        cls.network = {"checkpoint": "tiny.safetensors", "smal_asset": "world/assets/smal_synthetic.safetensors",
-                       "device": "cpu", "compute_threads": 1}
-        cls.superanimal = {"name": "superanimal", "format": "superanimal", "root": "world/superanimal_quadruped",
-                           "annotations": "annotations/test.json", "images": "images", "split": "test"}
+    def prepare(cls):
+        world = cls.shared / "world"
+        render_world(world)
+        make_network(cls.shared / "tiny.safetensors", seed=4)
+        hidden = {"truth": str(world / "truth" / "superanimal_quadruped_test.json"), "masks": str(world)}
+        config = write_config(cls.shared, cls.shared / "evaluation.json",
+                              datasets=[world_superanimal(world, **hidden), world_animal3d(world)])
+        evaluate(config, cls.shared / "evaluation", threads=1)
+
+    @classmethod
+    def recall(cls):
+        cls.world = cls.shared / "world"
+        cls.superanimal = world_superanimal(cls.world)
         cls.truth_file = cls.world / "truth" / "superanimal_quadruped_test.json"
         cls.truth = json.loads(cls.truth_file.read_text())["pictures"]
-        hidden = {"truth": f"world/truth/{cls.truth_file.name}", "masks": "world"}
-        animal3d = {"name": "animal3d", "format": "prima", "root": "world/animal3d", "annotations": "test.json",
-                    "split": "test"}
-        cls.config = cls.write_config("evaluation.json", datasets=[{**cls.superanimal, **hidden}, animal3d])
-        cls.out = cls.root / "evaluation"
-        run("evaluate", "--config", cls.config, "--out", cls.out, "--tta", 3, "--visible", 0.5, "--tta-curve", "0,2",
-            "--threads", 1)
-        cls.samples = rows_of(cls.out / "samples.csv")
+        cls.config = cls.shared / "evaluation.json"
+        cls.out = cls.shared / "evaluation"
+        cls.samples = read_csv(cls.out / "samples.csv")
 
-    @classmethod
-    def tearDownClass(cls):
-        shutil.rmtree(cls.root)
-
-    @classmethod
-    def write_config(cls, file_name, **changes):
-        config = {"network": cls.network, "tta": {"learning_rate": 1e-3}, **changes}
-        (cls.root / file_name).write_text(json.dumps(config))
-        return cls.root / file_name
+    def write_config(self, file_name, **changes):
+        return write_config(self.shared, self.folder / file_name, **changes)
 
     @classmethod
     def predictions(cls):
@@ -104,21 +91,15 @@ class Evaluation(unittest.TestCase):
     def build_pool(self, name, tau_low, tau_high):
         config = self.write_config(f"{name}.json", name=name, datasets=[self.superanimal],
                                    filter={"tau_low": tau_low, "tau_high": tau_high, "delta": 0.0})
-        run("build", "--config", config, "--out", self.root / name, "--quiet")
-        return config, self.root / name
+        run("build", "--config", config, "--out", self.folder / name, "--quiet")
+        return config, self.folder / name
 
     @staticmethod
     def labels(out):
         """id -> the columns of every kept sample."""
-        labels = {}
-        for path in sorted((out / "latest" / "shards").glob("*.h5")):
-            with h5py.File(path) as shard:
-                ids = [text.decode() for text in shard["id"][:]]
-                names = ["image_ref", "patch_box_px", "keypoints_px", "keypoints_weight", "projected_2d", "keypoints_3d"]
-                columns = {name: shard[name][:] for name in names}
-                for row, sample in enumerate(ids):
-                    labels[sample] = {name: column[row] for name, column in columns.items()}
-        return labels
+        columns = ["id", "image_ref", "patch_box_px", "keypoints_px", "keypoints_weight", "projected_2d",
+                   "keypoints_3d"]
+        return {sample["id"].decode(): sample for sample in read_samples(latest(out), columns)}
 
     def measured(self, label):
         """2D metrics at the mask's area give or take 3 %, L_proj, PA-MPJPE."""
@@ -180,36 +161,34 @@ class Evaluation(unittest.TestCase):
         self.assertLess(error("TTA 3"), error("TTA 3 with 50 % of the keypoints"))
 
     def test_threads_change_no_byte(self):
-        again = self.root / "again"
-        run("evaluate", "--config", self.config, "--out", again, "--tta", 3, "--visible", 0.5, "--tta-curve", "0,2",
-            "--threads", 4)
+        again = self.folder / "again"
+        evaluate(self.config, again, threads=4)
         for name in ("evaluation.json", "samples.csv", "tables.csv"):
             self.assertEqual((again / name).read_bytes(), (self.out / name).read_bytes(), name)
 
     def test_a_missing_picture_is_left_out_and_listed(self):
-        broken = self.root / "broken"
+        broken = self.folder / "broken"
         shutil.copytree(self.world / "animal3d", broken)
         record = json.loads((broken / "test.json").read_text())["data"][2]
         (broken / record["img_path"]).unlink()
-        config = self.write_config("broken.json", datasets=[{"name": "animal3d", "format": "prima", "root": "broken",
-                                                             "annotations": "test.json", "split": "test"}])
-        result = run("evaluate", "--config", config, "--out", self.root / "broken_out", "--json")
+        config = self.write_config("broken.json", datasets=[prima_dataset("broken", "animal3d", "test.json", "test")])
+        result = run("evaluate", "--config", config, "--out", self.folder / "broken_out", "--json")
         left_out = json.loads(result.stdout)["datasets"][0]["left_out"]
         self.assertEqual(left_out["reasons"], {"image_missing": 1})
         self.assertIn(record["img_path"], left_out["list"][0]["id"])
         self.assertIn("1 image_missing", result.stderr)
 
     def test_a_limit_takes_samples_from_the_whole_file(self):
-        run("evaluate", "--config", self.config, "--out", self.root / "few", "--limit", 4)
-        few = [row["id"] for row in rows_of(self.root / "few" / "samples.csv") if row["dataset"] == "animal3d/test"]
+        run("evaluate", "--config", self.config, "--out", self.folder / "few", "--limit", 4)
+        few = [row["id"] for row in read_csv(self.folder / "few" / "samples.csv") if row["dataset"] == "animal3d/test"]
         every = [row["id"] for row in self.predictions().values() if row["dataset"] == "animal3d/test"]
         self.assertEqual(few, [every[i * len(every) // 4] for i in range(4)])
 
     def test_comparisons(self):
-        same = json.loads(run("compare", "--before", self.out, "--after", self.out, "--json").stdout)
+        same = run_json("compare", "--before", self.out, "--after", self.out)
         self.assertEqual({row["finding"] for row in same["rows"]}, {"no difference shown"})
-        adapted = json.loads(run("compare", "--before", self.out, "--after", self.out, "--json", "--before-setting",
-                                 "prediction", "--after-setting", "TTA 3").stdout)
+        adapted = run_json("compare", "--before", self.out, "--after", self.out, "--before-setting", "prediction",
+                           "--after-setting", "TTA 3")
         row = next(r for r in adapted["rows"] if r["metric"] == "l_proj" and r["dataset"] == "superanimal/test")
         self.assertEqual(row["finding"], "better")
         self.assertLess(row["high"], 0)
@@ -222,9 +201,9 @@ class Evaluation(unittest.TestCase):
                         if row["dataset"] == "superanimal/test" and row["l_proj"])
         config, out = self.build_pool("pool", errors[len(errors) // 3], errors[2 * len(errors) // 3])
         arguments = ["evaluate-labels", "--config", config, "--out", out, "--truth", self.truth_file, "--masks",
-                     self.world, "--report", self.root / "report"]
+                     self.world, "--report", self.folder / "report"]
         run(*arguments)
-        rows = {row["id"]: row for row in rows_of(self.root / "report" / "labels.csv")}
+        rows = {row["id"]: row for row in read_csv(self.folder / "report" / "labels.csv")}
         labels = self.labels(out)
         self.assertEqual({row["verdict"] for row in rows.values()}, {"retained", "refined", "discarded"})
         self.assertEqual({i for i, row in rows.items() if row["label_l_proj"]}, set(labels))
@@ -234,7 +213,7 @@ class Evaluation(unittest.TestCase):
         for sample, row in rows.items():
             self.assertAlmostEqual(number(row["prediction_pa_mpvpe_mm"]),
                                    number(predictions[sample]["pa_mpvpe_mm"]), delta=0.05)
-        document = json.loads((self.root / "report" / "labels.json").read_text())
+        document = json.loads((self.folder / "report" / "labels.json").read_text())
         means = {(row["group"], row["bodies"]): row for row in document["rows"]}
         discarded = [number(row["prediction_pa_mpjpe_mm"]) for row in rows.values() if row["verdict"] == "discarded"]
         self.assertAlmostEqual(means["discarded", "prediction"]["against_annotated"]["pa_mpjpe_mm"],
@@ -244,12 +223,8 @@ class Evaluation(unittest.TestCase):
     def test_labels_need_a_finished_build(self):
         config = self.write_config("unbuilt.json", name="unbuilt", datasets=[self.superanimal],
                                    filter={"tau_low": 0.1, "tau_high": 0.2})
-        (self.root / "unbuilt").mkdir()
-        result = run("evaluate-labels", "--config", config, "--out", self.root / "unbuilt", "--truth", self.truth_file,
-                     expect=1)
+        out = self.folder / "unbuilt"
+        out.mkdir()
+        result = run("evaluate-labels", "--config", config, "--out", out, "--truth", self.truth_file, expect=1)
         self.assertIn("run `build`", result.stderr)
-        self.assertFalse((self.root / "unbuilt" / "stages").exists())
-
-
-if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1], verbosity=2)
+        self.assertFalse((out / "stages").exists())

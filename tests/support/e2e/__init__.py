@@ -1,0 +1,21 @@
+"""What the end-to-end scripts share.
+
+A script (tests/**/*_end_to_end.py) is a module of `Case` classes. It is run by this package's command line, see
+__main__.py, which also tells it where the program is. The parts:
+
+    case       Case: tests that share one expensive folder and write only into a folder of their own
+    program    run and start the program; make it stop, hang or fail at an exact point; kill and resume it
+    scene      Scene: drawn pictures, a tiny network, a config and calibrated thresholds
+    pictures   draw pictures and annotations, give bodies to annotations, make networks and the rendered world
+    datasets   read what the program wrote: verdicts, labels, digests, journals; damage files
+"""
+
+from .case import Case
+from .datasets import (copy_folder, digests, file_sha256, flip_bit, journal_lines, kept, latest, read_csv,
+                       read_safetensors, read_samples, split_safetensors, stamps, units_in_journals, verdicts,
+                       write_safetensors)
+from .pictures import (FOCAL, draw_pictures, give_bodies, make_network, prima_dataset, render_world, smooth_picture,
+                       world_animal3d, world_body, world_superanimal, write_annotations, write_json)
+from .program import (LIMIT_S, Fault, alarm_seconds, fault_lines, kill_and_resume, program, run, run_json, started,
+                      wait_until)
+from .scene import PICTURES, UNIT, Scene

@@ -1,0 +1,76 @@
+"""The small job that most tests begin with."""
+
+import json
+
+from .datasets import latest
+from .pictures import draw_pictures, make_network, prima_dataset, write_annotations, write_json
+from .program import run
+
+PICTURES = 24
+UNIT = 6  # candidates
+
+
+class Scene:
+    """A dataset of drawn pictures, a tiny network, a config and calibrated thresholds.
+
+    `root` holds them; Scene.make() writes them. Configs and output folders of a test go into `folder`.
+    """
+
+    def __init__(self, root, folder=None):
+        self.root = root
+        self.folder = folder or root
+        self.data = root / "data"
+        self.network = root / "tiny.safetensors"
+        self.body = root / "smal.safetensors"
+        self.config = root / "config.json"
+        self.thresholds = root / "thresholds.json"
+
+    @classmethod
+    def make(cls, root):
+        """Writes the files of a scene and returns it."""
+        scene = cls(root)
+        write_annotations(scene.data, draw_pictures(scene.data, PICTURES))
+        make_network(scene.network, seed=3, body=scene.body)
+        scene.write_config("config.json")
+        run("calibrate", "--config", scene.config, "--out", root / "calibration", "--write", scene.thresholds)
+        return scene
+
+    def in_folder(self, folder):
+        """The same scene for one test, whose configs and output folders go into `folder`."""
+        return Scene(self.root, folder)
+
+    @property
+    def records(self):
+        """The annotations, as the file has them."""
+        return json.loads((self.data / "train.json").read_text())["data"]
+
+    @property
+    def limits(self):
+        """The calibrated thresholds: tau_low, tau_high, delta."""
+        return json.loads(self.thresholds.read_text())["filter"]
+
+    def write_config(self, name, **changes):
+        """Writes the scene's config with changes: an object's members are replaced one by one, all else as a whole."""
+        config = {
+            "name": "drawn", "version": "1.0.0", "datasets": [prima_dataset(self.data)],
+            "network": {"checkpoint": str(self.network), "smal_asset": str(self.body), "device": "cpu", "batch": 4,
+                        "compute_threads": 1},
+            "tta": {"learning_rate": 1e-3, "batch": 4},
+            "shards": {"unit_size": UNIT},
+        }
+        for key, value in changes.items():
+            config[key] = {**config[key], **value} if isinstance(config.get(key), dict) else value
+        return write_json(self.folder / name, config)
+
+    def build_words(self, out, *more, config=None):
+        """Arguments of a build into folder/out."""
+        return ["build", "--config", config or self.config, "--config", self.thresholds, "--out", self.folder / out,
+                *more]
+
+    def build(self, out, *more, config=None, **options):
+        """Builds into folder/out. `options` go to run()."""
+        return run(*self.build_words(out, *more, config=config), **options)
+
+    def latest(self, out):
+        """The newest dataset in folder/out."""
+        return latest(self.folder / out)
