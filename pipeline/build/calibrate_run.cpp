@@ -148,8 +148,8 @@ double delta_of(const std::string& dataset, const config::FilterConfig& filter) 
   return own == filter.datasets.end() ? filter.delta : own->second.delta.value_or(filter.delta);
 }
 
-CalibratedPool calibrate_pool(const std::string& dataset, const std::vector<Scored>& candidates,
-                              const config::BuildConfig& config, Workspace& workspace) {
+filters::CalibratedPool calibrate_pool(const std::string& dataset, const std::vector<Scored>& candidates,
+                                       const config::BuildConfig& config, Workspace& workspace) {
   if (candidates.empty()) {
     throw std::runtime_error(fmt::format(
         "no candidate{} could be predicted, so there is nothing to calibrate on; `build` with any thresholds "
@@ -168,7 +168,7 @@ CalibratedPool calibrate_pool(const std::string& dataset, const std::vector<Scor
   filters::Thresholds limits = filters::calibrate(pool, config.calibrate, base).thresholds;
   limits.tau_high = kNoLimit;
   limits.iterations_min = limits.iterations_max = limits.gain_window;
-  CalibratedPool result;
+  filters::CalibratedPool result;
   result.dataset = dataset;
   result.adapted = adapt_until_enough(pool, candidates, limits, config, workspace);
   result.calibration = filters::calibrate(pool, config.calibrate, base);
@@ -215,7 +215,7 @@ CalibrationSummary calibrate(const config::BuildConfig& config, const run::RunOp
 
 std::string thresholds_layer(const CalibrationSummary& summary) {
   nlohmann::ordered_json filter = nlohmann::ordered_json::object();
-  for (const CalibratedPool& pool : summary.pools) {
+  for (const filters::CalibratedPool& pool : summary.pools) {
     const filters::Thresholds& thresholds = pool.calibration.thresholds;
     nlohmann::ordered_json& place = pool.dataset.empty() ? filter : filter["datasets"][pool.dataset];
     place["tau_low"] = thresholds.tau_low;

@@ -5,26 +5,14 @@
 #include <string>
 #include <vector>
 
-#include "filters/calibrate.h"
-#include "filters/yield_curve.h"
+#include "filters/calibrated_pool.h"
 #include "pipeline/build/build.h"
 #include "pipeline/config/build_config.h"
 
 namespace q3d::pipeline::build {
 
-// The candidates that share thresholds: all of them, or those of one dataset.
-struct CalibratedPool {
-  std::string dataset;  // empty: all datasets
-  filters::Calibration calibration;
-  std::int64_t judged = 0;   // candidates with a prediction
-  std::int64_t adapted = 0;  // of the middle band, to see whether they reach delta
-  std::vector<filters::YieldPoint> curve;
-  filters::YieldPoint at_tau_low;
-  filters::YieldPoint at_tau_high;
-};
-
 struct CalibrationSummary {
-  std::vector<CalibratedPool> pools;
+  std::vector<filters::CalibratedPool> pools;
   std::int64_t candidates = 0;
   double seconds = 0.0;
 };

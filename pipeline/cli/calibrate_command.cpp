@@ -22,7 +22,7 @@ struct Arguments {
   bool json = false;
 };
 
-void print_pool(const build::CalibratedPool& pool) {
+void print_pool(const filters::CalibratedPool& pool) {
   const filters::Calibration& result = pool.calibration;
   fmt::print(stderr, "\n{}: {} candidates have a prediction, {} were adapted\n",
              pool.dataset.empty() ? "all datasets" : pool.dataset, pool.judged, pool.adapted);
@@ -42,7 +42,7 @@ void print_pool(const build::CalibratedPool& pool) {
 void print_summary(const build::CalibrationSummary& summary, const Arguments& arguments) {
   fmt::print(stderr, "\ncalibrated on {} candidates in {}\n", summary.candidates,
              run::human_duration(summary.seconds));
-  for (const build::CalibratedPool& pool : summary.pools) print_pool(pool);
+  for (const filters::CalibratedPool& pool : summary.pools) print_pool(pool);
   fmt::print(stderr, "\n");
   fmt::print("{}", build::thresholds_layer(summary));
   if (!arguments.figure.empty()) fmt::print(stderr, "wrote {}\n", arguments.figure.string());
@@ -56,7 +56,7 @@ nlohmann::ordered_json to_json(const build::CalibrationSummary& summary) {
   nlohmann::ordered_json pools = nlohmann::ordered_json::array();
   std::int64_t judged = 0;
   std::int64_t adapted = 0;
-  for (const build::CalibratedPool& pool : summary.pools) {
+  for (const filters::CalibratedPool& pool : summary.pools) {
     judged += pool.judged;
     adapted += pool.adapted;
     const filters::Calibration& result = pool.calibration;
@@ -122,7 +122,7 @@ Command add_calibrate(CLI::App& app) {
         build::calibrate(config::load_build_config(arguments->configs), arguments->run);
     if (!arguments->write.empty()) build::write_thresholds(arguments->write, summary);
     if (!arguments->figure.empty()) {
-      manifests::write_file_atomically(arguments->figure, report::calibration_figure(summary));
+      manifests::write_file_atomically(arguments->figure, report::calibration_figure(summary.pools));
     }
     if (arguments->json) {
       fmt::print("{}\n", to_json(summary).dump());

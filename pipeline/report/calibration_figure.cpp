@@ -23,7 +23,7 @@ constexpr std::size_t kTableSteps = 10;
 constexpr double kShownYield = 0.95;
 constexpr double kBeyondTauHigh = 1.25;
 
-double last_tau(const build::CalibratedPool& pool) {
+double last_tau(const filters::CalibratedPool& pool) {
   double last = kBeyondTauHigh * pool.at_tau_high.tau;
   for (const YieldPoint& point : pool.curve) {
     if (point.yield <= kShownYield) last = std::max(last, point.tau);
@@ -43,7 +43,8 @@ double tick_step(double range) {
 
 class Panel {
  public:
-  Panel(const build::CalibratedPool& pool, double top) : pool_(pool), top_(top), last_tau_(last_tau(pool)) {}
+  Panel(const filters::CalibratedPool& pool, double top)
+      : pool_(pool), top_(top), last_tau_(last_tau(pool)) {}
 
   std::string draw() {
     title();
@@ -118,7 +119,7 @@ class Panel {
     add("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"4\" fill=\"{}\"/>\n", x, y, colour);
   }
 
-  const build::CalibratedPool& pool_;
+  const filters::CalibratedPool& pool_;
   double top_;
   double last_tau_;
   std::string svg_;
@@ -132,21 +133,21 @@ std::string table_line(const YieldPoint& point, const std::string& remark) {
 
 }  // namespace
 
-std::string calibration_figure(const build::CalibrationSummary& summary) {
-  const auto height = kPanelHeight * static_cast<int>(summary.pools.size());
+std::string calibration_figure(std::span<const filters::CalibratedPool> pools) {
+  const auto height = kPanelHeight * static_cast<int>(pools.size());
   std::string svg = fmt::format(
       "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{1}\" viewBox=\"0 0 {0} {1}\" "
       "font-family=\"sans-serif\" font-size=\"13\">\n<rect width=\"{0}\" height=\"{1}\" fill=\"#fff\"/>\n",
       kWidth, height);
   double top = 0.0;
-  for (const build::CalibratedPool& pool : summary.pools) {
+  for (const filters::CalibratedPool& pool : pools) {
     svg += Panel(pool, top).draw();
     top += kPanelHeight;
   }
   return svg + "</svg>\n";
 }
 
-std::string calibration_table(const build::CalibratedPool& pool) {
+std::string calibration_table(const filters::CalibratedPool& pool) {
   std::vector<std::pair<YieldPoint, std::string>> rows{{pool.at_tau_low, "tau_low"},
                                                        {pool.at_tau_high, "tau_high"}};
   std::size_t step = 1;

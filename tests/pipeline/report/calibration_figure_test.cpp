@@ -8,18 +8,16 @@ namespace q3d::pipeline::report {
 namespace {
 
 // tau_high 0.4, so the axis ends at 0.5.
-build::CalibrationSummary summary() {
-  build::CalibratedPool pool;
+std::vector<filters::CalibratedPool> pools() {
+  filters::CalibratedPool pool;
   pool.dataset = "animals";
   pool.judged = 4;
   pool.curve = {{0.1, 0.25, 90.0}, {0.25, 0.5, 80.0}, {0.45, 0.75, 75.0}, {2.0, 1.0, 60.0}};
   pool.at_tau_low = {0.2, 0.25, 90.0};
   pool.at_tau_high = {0.4, 0.5, 80.0};
-  build::CalibrationSummary result;
-  result.pools = {pool, pool};
-  result.pools[1].dataset = "";
-  result.pools[1].at_tau_low = {0.05, 0.0, std::numeric_limits<double>::quiet_NaN()};
-  result.candidates = 5;
+  std::vector<filters::CalibratedPool> result{pool, pool};
+  result[1].dataset = "";
+  result[1].at_tau_low = {0.05, 0.0, std::numeric_limits<double>::quiet_NaN()};
   return result;
 }
 
@@ -28,7 +26,7 @@ bool holds(const std::string& text, const std::string& part) {
 }
 
 TEST(CalibrationFigure, PlacesCurvesAndChosenPoints) {
-  const std::string svg = calibration_figure(summary());
+  const std::string svg = calibration_figure(pools());
   // x: 60 to 700 px for 0 to 0.5; y: 320 to 60 px for 0 to 100 %.
   EXPECT_TRUE(holds(svg, "points=\"188.0,255.0 380.0,190.0 636.0,125.0 \""))
       << "yield, without the last point";
@@ -42,7 +40,7 @@ TEST(CalibrationFigure, PlacesCurvesAndChosenPoints) {
 }
 
 TEST(CalibrationTable, ShowsTenthsAndTheChosenPoints) {
-  const std::string text = calibration_table(summary().pools[0]);
+  const std::string text = calibration_table(pools()[0]);
   EXPECT_EQ(text,
             "   threshold  yield %    AUC %\n"
             "         0.1     25.0    90.00\n"
@@ -51,21 +49,6 @@ TEST(CalibrationTable, ShowsTenthsAndTheChosenPoints) {
             "         0.4     50.0    80.00  <- tau_high\n"
             "        0.45     75.0    75.00\n"
             "           2    100.0    60.00\n");
-}
-
-TEST(ThresholdsLayer, IsAConfigLayer) {
-  build::CalibrationSummary given = summary();
-  given.pools.resize(1);
-  given.pools[0].calibration.thresholds.tau_low = 0.2;
-  given.pools[0].calibration.thresholds.tau_high = 0.4;
-  given.pools[0].calibration.thresholds.delta = 0.05;
-  const auto own = nlohmann::json::parse(build::thresholds_layer(given));
-  EXPECT_EQ(
-      own, nlohmann::json::parse(
-               R"({"filter": {"datasets": {"animals": {"tau_low": 0.2, "tau_high": 0.4, "delta": 0.05}}}})"));
-  given.pools[0].dataset = "";
-  EXPECT_EQ(nlohmann::json::parse(build::thresholds_layer(given)),
-            nlohmann::json::parse(R"({"filter": {"tau_low": 0.2, "tau_high": 0.4, "delta": 0.05}})"));
 }
 
 }  // namespace
