@@ -20,8 +20,12 @@
 #include "pipeline/run/interrupt.h"
 #include "pipeline/run/progress.h"
 #include "pipeline/stages/stage_store.h"
+#include "pipeline/unit/crop_keypoints.h"
+#include "pipeline/unit/decode.h"
+#include "pipeline/unit/judge.h"
+#include "pipeline/unit/predict.h"
+#include "pipeline/unit/refine.h"
 #include "pipeline/unit/unit_flow.h"
-#include "pipeline/unit/unit_steps.h"
 #include "pipeline/unit/unit_tables.h"
 
 namespace q3d::pipeline::build {

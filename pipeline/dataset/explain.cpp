@@ -18,7 +18,7 @@
 #include "pipeline/config/json_fields.h"
 #include "pipeline/dataset/dataset_manifest.h"
 #include "pipeline/stages/stage_store.h"
-#include "pipeline/unit/unit_steps.h"
+#include "pipeline/unit/crop_keypoints.h"
 #include "pipeline/unit/unit_tables.h"
 
 namespace q3d::pipeline::dataset {

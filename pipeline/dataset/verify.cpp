@@ -20,7 +20,7 @@
 #include "pipeline/run/interrupt.h"
 #include "pipeline/run/progress.h"
 #include "pipeline/unit/annotated_body.h"
-#include "pipeline/unit/unit_steps.h"
+#include "pipeline/unit/crop_keypoints.h"
 
 namespace q3d::pipeline::dataset {
 namespace {

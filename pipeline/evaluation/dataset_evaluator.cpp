@@ -6,8 +6,8 @@
 #include <memory>
 
 #include "pipeline/run/interrupt.h"
+#include "pipeline/unit/decode.h"
 #include "pipeline/unit/unit_flow.h"
-#include "pipeline/unit/unit_steps.h"
 
 namespace q3d::pipeline::evaluation {
 namespace {

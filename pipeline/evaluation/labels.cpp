@@ -10,7 +10,8 @@
 #include "pipeline/network/torch_bodies.h"
 #include "pipeline/run/interrupt.h"
 #include "pipeline/run/progress.h"
-#include "pipeline/unit/unit_steps.h"
+#include "pipeline/unit/crop_keypoints.h"
+#include "pipeline/unit/decode.h"
 
 namespace q3d::pipeline::evaluation {
 namespace {

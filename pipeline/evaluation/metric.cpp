@@ -4,7 +4,7 @@
 #include <stdexcept>
 
 #include "filters/metrics.h"
-#include "pipeline/unit/unit_steps.h"
+#include "pipeline/unit/crop_keypoints.h"
 #include "smal/axis_angle.h"
 
 namespace q3d::pipeline::evaluation {

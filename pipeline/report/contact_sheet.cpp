@@ -13,7 +13,7 @@
 #include "loaders/pictures/stored_crop.h"
 #include "manifests/atomic_file.h"
 #include "pipeline/unit/annotated_body.h"
-#include "pipeline/unit/unit_steps.h"
+#include "pipeline/unit/crop_keypoints.h"
 
 namespace q3d::pipeline::report {
 namespace {

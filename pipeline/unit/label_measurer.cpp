@@ -7,7 +7,7 @@
 
 #include "loaders/keypoints/topology.h"
 #include "pipeline/render/silhouette.h"
-#include "pipeline/unit/unit_steps.h"
+#include "pipeline/unit/crop_keypoints.h"
 #include "smal/axis_angle.h"
 
 namespace q3d::pipeline::unit {

@@ -6,7 +6,9 @@
 
 #include <stdexcept>
 
-#include "pipeline/unit/unit_steps.h"
+#include "pipeline/unit/crop_keypoints.h"
+#include "pipeline/unit/judge.h"
+#include "pipeline/unit/refine.h"
 
 namespace q3d::pipeline::unit {
 namespace {

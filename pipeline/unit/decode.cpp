@@ -1,0 +1,84 @@
+#include "pipeline/unit/decode.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include "loaders/pictures/box.h"
+#include "loaders/pictures/crop.h"
+#include "loaders/pictures/encode.h"
+#include "loaders/pictures/image.h"
+#include "loaders/pictures/stored_crop.h"
+#include "pipeline/run/interrupt.h"
+
+namespace q3d::pipeline::unit {
+namespace {
+
+using manifests::Reason;
+
+void store_crop(DecodedSample& sample, const cv::Mat& rgb, const cv::Mat& mask,
+                const loaders::pictures::SquareBox& box, const config::ShardConfig& shards) {
+  const loaders::pictures::StoredCrop crop =
+      loaders::pictures::make_stored_crop(rgb, mask, box, shards.crop_scale, shards.crop_min_side_px);
+  sample.stored_side_px = crop.rgb.cols;
+  sample.stored_from_image = crop.from_image;
+  if (shards.images == "reference") return;
+  sample.stored_crop = shards.images == "png" ? loaders::pictures::encode_png(crop.rgb)
+                                              : loaders::pictures::encode_jpeg(crop.rgb, shards.jpeg_quality);
+  if (!crop.mask.empty()) sample.stored_mask = loaders::pictures::encode_png(crop.mask);
+}
+
+}  // namespace
+
+DecodedSample decode_sample(const manifests::SampleRecord& record, Wanted want,
+                            const config::ShardConfig& shards) {
+  DecodedSample sample;
+  const loaders::pictures::DecodedImage image = loaders::pictures::decode_image(record.image_path);
+  if (image.failure != Reason::none) {
+    sample.failure = image.failure;
+    sample.detail = image.detail;
+    return sample;
+  }
+  // A sample whose mask is absent, unreadable or no silhouette has none. If a file is named, the detail says
+  // what is wrong with it.
+  const loaders::pictures::DecodedMask mask = loaders::pictures::decode_mask(record.mask_path);
+  const bool has_mask = mask.silhouette.size() == image.rgb.size();
+  if (!has_mask && mask.kind != loaders::pictures::MaskKind::absent) {
+    sample.detail =
+        "the mask is left out: " + (mask.detail.empty() ? "it is not of the picture's size" : mask.detail);
+  }
+  sample.image_width_px = image.rgb.cols;
+  sample.image_height_px = image.rgb.rows;
+  sample.has_mask = has_mask;
+  if (const auto problem = loaders::pictures::find_box_problem(record.box, image.rgb.cols, image.rgb.rows)) {
+    sample.failure = problem->reason;
+    sample.detail = fmt::format("got {}, expected {}", problem->got, problem->expected);
+    return sample;
+  }
+  const loaders::pictures::SquareBox square = loaders::pictures::square_box(record.box);
+  if (want.patch || want.patch_mask) {
+    const bool warps_mask = (want.mask_area || want.patch_mask) && has_mask;
+    const loaders::pictures::Patch patch =
+        loaders::pictures::make_patch(image.rgb, warps_mask ? mask.silhouette : cv::Mat(), square);
+    sample.patch.assign(patch.rgb.datastart, patch.rgb.dataend);
+    // As in the official evaluator, the area is the sum of the warped mask / 255, soft edges included.
+    if (patch.has_mask) sample.mask_area_px = cv::sum(patch.mask)[0] / 255.0;
+    if (want.patch_mask && patch.has_mask) {
+      sample.patch_mask.assign(patch.mask.datastart, patch.mask.dataend);
+    }
+  }
+  if (want.stored_crop) store_crop(sample, image.rgb, has_mask ? mask.silhouette : cv::Mat(), square, shards);
+  sample.decoded = true;
+  return sample;
+}
+
+void decode_unit(UnitWork& work, const config::ShardConfig& shards, const config::JudgingRules* rules) {
+  work.decoded.assign(work.candidates.size(), {});
+  tbb::parallel_for(std::size_t{0}, work.candidates.size(), [&](std::size_t i) {
+    if (run::interrupted()) return;
+    if (const auto want = wanted(picture_facts(work, i, rules))) {
+      work.decoded[i] = decode_sample(work.candidates[i].record, *want, shards);
+    }
+  });
+}
+
+}  // namespace q3d::pipeline::unit

@@ -1,0 +1,18 @@
+// The step that decodes the pictures of a unit.
+#pragma once
+
+#include "pipeline/config/judging_rules.h"
+#include "pipeline/unit/picture_needs.h"
+#include "pipeline/unit/unit_work.h"
+
+namespace q3d::pipeline::unit {
+
+// Decodes, checks and crops one candidate's picture. A bad picture is a failure in the result.
+DecodedSample decode_sample(const manifests::SampleRecord& record, Wanted want,
+                            const config::ShardConfig& shards);
+
+// Fills work.decoded, in parallel, with what the steps to come need of each picture (picture_needs.h).
+// `rules` may be null when only predictions are wanted; then no stored crops are made.
+void decode_unit(UnitWork& work, const config::ShardConfig& shards, const config::JudgingRules* rules);
+
+}  // namespace q3d::pipeline::unit

@@ -1,0 +1,126 @@
+#include "pipeline/unit/judge.h"
+
+#include <fmt/format.h>
+
+#include <limits>
+
+#include "filters/metrics.h"
+#include "pipeline/unit/annotated_body.h"
+#include "pipeline/unit/crop_keypoints.h"
+
+namespace q3d::pipeline::unit {
+namespace {
+
+using manifests::Reason;
+using manifests::Verdict;
+
+manifests::Judgement failed(Reason reason, const std::string& detail) {
+  manifests::Judgement judgement;
+  judgement.verdict = Verdict::failed;
+  judgement.reason = reason;
+  judgement.detail = detail;
+  return judgement;
+}
+
+// adapt_request (refine.h) gives a sample with one visible keypoint no iterations, because nothing could tell
+// whether adaptation helped.
+manifests::Judgement nothing_to_hold_out(const RefinedSample& refined) {
+  manifests::Judgement judgement;
+  judgement.verdict = Verdict::discarded;
+  judgement.reason = Reason::held_out_not_better;
+  judgement.detail = "one visible keypoint: none can be held out";
+  judgement.initial_error = refined.curve[0];
+  judgement.final_error = refined.curve[0];
+  return judgement;
+}
+
+// Keeps a label in which the network has no part.
+manifests::Judgement judge_annotated(const candidates::Candidate& candidate,
+                                     const device::BodyPrediction& body) {
+  manifests::Judgement judgement;
+  judgement.verdict = Verdict::retained;
+  if (has_projection(body.keypoints_2d)) {
+    judgement.final_error = filters::projection_error(body.keypoints_2d, crop_keypoints(candidate.record))
+                                .value_or(std::numeric_limits<double>::quiet_NaN());
+  }
+  return judgement;
+}
+
+manifests::Judgement judge_predicted(const candidates::Candidate& candidate, const PredictedSample& predicted,
+                                     const config::JudgingRules& rules) {
+  if (predicted.failure != Reason::none) return failed(predicted.failure, predicted.detail);
+  if (candidate.role != config::Role::pseudo) return judge_annotated(candidate, predicted.body);
+  return filters::judge_initial(initial_error(candidate, predicted), rules.of(candidate.record.dataset));
+}
+
+// Discards a candidate that the user or a test split excludes. It keeps its numbers; a failed one stays
+// failed.
+void apply_exclusion(const candidates::Exclusion& exclusion, manifests::Judgement& judgement) {
+  if (exclusion.reason == Reason::none || judgement.verdict == Verdict::failed) return;
+  judgement.verdict = Verdict::discarded;
+  judgement.reason = exclusion.reason;
+  judgement.detail = exclusion.detail;
+}
+
+}  // namespace
+
+double initial_error(const candidates::Candidate& candidate, const PredictedSample& predicted) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  if (predicted.failure != Reason::none || candidate.role != config::Role::pseudo) return kNone;
+  return filters::projection_error(predicted.body.keypoints_2d, crop_keypoints(candidate.record))
+      .value_or(kNone);
+}
+
+manifests::Judgement judge_refined(const manifests::SampleRecord& record, double error,
+                                   const RefinedSample& refined, const filters::Thresholds& thresholds,
+                                   const config::GuardConfig& guards) {
+  if (refined.curve.empty()) {
+    return failed(Reason::prediction_not_finite, "nothing could be measured in adaptation");
+  }
+  const int visible = visible_keypoints(crop_keypoints(record));
+  if (guards.held_out_share > 0.0 && refined.held_out_curve.empty()) return nothing_to_hold_out(refined);
+  manifests::Judgement judgement =
+      guards.held_out_share > 0.0 ? filters::judge_held_out(refined.curve, refined.held_out_curve, thresholds)
+                                  : filters::judge_adapted(refined.curve, thresholds);
+  if (visible >= guards.iterations_full_at) return judgement;
+  const int unscaled = filters::adaptation_iterations(error, thresholds);
+  const int scaled = filters::scaled_iterations(unscaled, visible, guards.iterations_full_at);
+  if (judgement.reason == Reason::gain_too_small && scaled < thresholds.gain_window) {
+    judgement.reason = Reason::scaled_gain_too_small;
+  }
+  judgement.detail += fmt::format("{}at most {} of {} iterations for {} visible keypoints",
+                                  judgement.detail.empty() ? "" : "; ", scaled, unscaled, visible);
+  return judgement;
+}
+
+void judge_unit(UnitWork& work, const config::JudgingRules& rules) {
+  work.judgements.assign(work.candidates.size(), {});
+  for (std::size_t i = 0; i < work.candidates.size(); ++i) {
+    work.judgements[i] = judge_predicted(work.candidates[i], (*work.predicted)[i], rules);
+  }
+  if (work.refined) {
+    for (const RefinedSample& refined : *work.refined) {
+      const candidates::Candidate& candidate = work.candidates[refined.sample];
+      const double error = initial_error(candidate, (*work.predicted)[refined.sample]);
+      work.judgements[refined.sample] =
+          judge_refined(candidate.record, error, refined, rules.of(candidate.record.dataset), rules.guards);
+    }
+  }
+  if (work.measured) {
+    for (const MeasuredLabel& label : *work.measured) {
+      manifests::Judgement& judgement = work.judgements[label.sample];
+      judgement = filters::apply_bounds(std::move(judgement), label.measures, rules.guards);
+    }
+  }
+  for (std::size_t i = 0; i < work.candidates.size(); ++i) {
+    apply_exclusion(work.candidates[i].exclusion, work.judgements[i]);
+    std::string& detail = work.judgements[i].detail;
+    if (detail.empty()) detail = (*work.predicted)[i].detail;
+  }
+}
+
+bool is_kept(const manifests::Judgement& judgement) {
+  return judgement.verdict == Verdict::retained || judgement.verdict == Verdict::refined;
+}
+
+}  // namespace q3d::pipeline::unit

@@ -1,0 +1,77 @@
+#include "pipeline/unit/picture_needs.h"
+
+#include <array>
+#include <cmath>
+
+#include "filters/fidelity.h"
+#include "pipeline/unit/judge.h"
+
+namespace q3d::pipeline::unit {
+namespace {
+
+using filters::Band;
+using manifests::Reason;
+
+// What a candidate needs at each point of its way, as far as its facts ask for it: patches are for pseudo
+// labels, stored crops for what goes to a shard, masks for what is measured against them.
+struct Needs {
+  Standing standing;
+  bool decoding;  // even if no part is needed
+  bool patch;
+  bool stored_crop;
+  bool patch_mask;
+};
+// In the order of Standing.
+constexpr std::array<Needs, 4> kNeeds{{
+    // standing             decoding  patch  stored_crop  patch_mask
+    {Standing::unpredicted, true, true, true, true},
+    {Standing::to_adapt, false, true, true, true},
+    {Standing::may_be_kept, false, false, true, true},
+    {Standing::finished, false, false, false, false},
+}};
+
+Standing standing_of(const UnitWork& work, std::size_t i, const config::JudgingRules* rules) {
+  const candidates::Candidate& candidate = work.candidates[i];
+  if (candidate.record.failure != Reason::none) return Standing::finished;
+  if (!work.predicted) return Standing::unpredicted;
+  const PredictedSample& predicted = (*work.predicted)[i];
+  if (rules == nullptr || predicted.failure != Reason::none) return Standing::finished;
+  if (candidate.role != config::Role::pseudo) return Standing::may_be_kept;
+  const double error = initial_error(candidate, predicted);
+  if (std::isnan(error)) return Standing::finished;
+  if (work.refined) return is_kept(work.judgements[i]) ? Standing::may_be_kept : Standing::finished;
+  switch (filters::band(error, rules->of(candidate.record.dataset))) {
+    case Band::retain:
+      return Standing::may_be_kept;
+    case Band::refine:
+      return Standing::to_adapt;
+    case Band::discard:
+      return Standing::finished;
+  }
+  return Standing::finished;
+}
+
+}  // namespace
+
+std::optional<Wanted> wanted(const PictureFacts& facts) {
+  const Needs& needs = kNeeds.at(static_cast<std::size_t>(facts.standing));
+  const Wanted want{.patch = needs.patch && facts.is_pseudo,
+                    .stored_crop = needs.stored_crop && facts.goes_to_shard,
+                    .patch_mask = needs.patch_mask && facts.measures_mask};
+  const bool needs_part = want.patch || want.stored_crop || want.patch_mask;
+  return needs.decoding || needs_part ? std::optional(want) : std::nullopt;
+}
+
+PictureFacts picture_facts(const UnitWork& work, std::size_t i, const config::JudgingRules* rules) {
+  const candidates::Candidate& candidate = work.candidates[i];
+  PictureFacts facts;
+  facts.standing = standing_of(work, i, rules);
+  facts.is_pseudo = candidate.role == config::Role::pseudo;
+  if (rules == nullptr) return facts;
+  facts.goes_to_shard = !work.shard_before && candidate.exclusion.reason == Reason::none;
+  facts.measures_mask = facts.is_pseudo && rules->guards.mask_iou_min > 0.0 && !work.measured &&
+                        !candidate.record.mask_path.empty();
+  return facts;
+}
+
+}  // namespace q3d::pipeline::unit

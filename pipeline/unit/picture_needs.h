@@ -1,0 +1,44 @@
+// What the steps to come need of a candidate's picture, as a decision table.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+#include "pipeline/config/judging_rules.h"
+#include "pipeline/unit/unit_work.h"
+
+namespace q3d::pipeline::unit {
+
+// How far a candidate has come when its unit is decoded.
+enum class Standing : std::uint8_t {
+  unpredicted,  // its picture must be decoded, if only to learn whether it can be
+  to_adapt,     // its prediction lies in the middle band and has not been adapted
+  may_be_kept,  // no verdict so far drops it
+  finished,     // it failed, it was dropped, or the run makes predictions only
+};
+
+// What decides which parts of a picture are needed.
+struct PictureFacts {
+  Standing standing = Standing::finished;
+  bool is_pseudo = false;      // its label comes from the network
+  bool goes_to_shard = false;  // the unit's shard is still to be made, and nothing leaves the candidate out
+  bool measures_mask = false;  // its label is still to be measured against its mask
+};
+
+// Parts of a picture.
+struct Wanted {
+  bool patch = false;  // the network's crop
+  bool stored_crop = false;
+  bool mask_area = false;   // of the patch; comes with it
+  bool patch_mask = false;  // likewise
+};
+
+// Returns the parts that the steps to come need. It is empty if the picture need not be decoded.
+std::optional<Wanted> wanted(const PictureFacts& facts);
+
+// Returns the facts of candidate `i` of the unit. `rules` is null in a run that makes predictions only. Needs
+// work.judgements where work.refined is there.
+PictureFacts picture_facts(const UnitWork& work, std::size_t i, const config::JudgingRules* rules);
+
+}  // namespace q3d::pipeline::unit

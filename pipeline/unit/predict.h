@@ -1,0 +1,14 @@
+// The step that predicts the bodies of a unit.
+#pragma once
+
+#include "pipeline/unit/network_source.h"
+#include "pipeline/unit/unit_work.h"
+
+namespace q3d::pipeline::unit {
+
+// Fills work.predicted. The candidates of role `pseudo` whose pictures were decoded get the network's
+// prediction, in batches inside the unit; a prediction that is not finite is a failed sample. The other
+// candidates get the body that their annotation gives, or none. Does nothing if work.predicted is there.
+void predict_unit(UnitWork& work, const NetworkSource& network);
+
+}  // namespace q3d::pipeline::unit
