@@ -7,6 +7,7 @@
 
 #include <cstdio>
 #include <new>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -28,7 +29,7 @@ int run(int argc, char** argv) {
       "that have 2D keypoints, and records for every label how it was made and why it was kept or dropped."};
   app.name("quadruped3d");
   app.require_subcommand(1);
-  app.set_version_flag("--version", "quadruped3d " + std::string(run::version()));
+  app.set_version_flag("--version", "quadruped3d " + std::string(q3d::pipeline::run::version()));
   app.footer(
       "First steps:\n"
       "  quadruped3d sample --out data/world                 render pictures to try the program with\n"
