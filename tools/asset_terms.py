@@ -1,4 +1,4 @@
-"""The terms of the official files, and the user's consent to them.
+"""Shows the terms of the official files and obtains the user's consent.
 
 The terms below are summaries of what the owners publish; their own texts decide. Consent is recorded for each text, so
 that a later run asks only about terms that are new or have changed here.
@@ -80,10 +80,10 @@ conditions. These are summaries. Read the full texts; they are what you agree to
 
 
 def obtain_consent(folder: str, terms: Sequence[Terms], given: bool, say: Say) -> None:
-    """Returns when the user accepts all terms, and records that in `folder`.
+    """Shows the terms that the user has not accepted yet, asks for consent and records it in `folder`.
 
-    given: the command line accepts the terms. They are shown all the same. Throws ConsentRefused when the user says
-    no, ConsentMissing when there is no terminal to ask at, and OSError.
+    given: the user consents on the command line; the terms are shown, but nothing is asked. Throws ConsentRefused when
+    the user says no, ConsentMissing when there is no terminal to ask at, and OSError.
     """
     record = os.path.join(folder, RECORD_NAME)
     accepted = _accepted_digests(record)

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Says which pinned packages are not whole in the environment of the Python that runs it.
+"""Lists the pinned packages that are incomplete in the environment of the Python that runs it.
 
   check_wheels.py requirements.txt            prints the packages that are absent, of another version, or lack files
   check_wheels.py --forget requirements.txt   prints those that lack files, and removes their metadata, after which pip
-                                              installs them anew; pip cannot see by itself that they are not whole
+                                              installs them anew; pip does not notice that they are incomplete
 
-Exit codes: 0 all are whole, 1 the printed ones are not, 2 wrong usage.
+Exit codes: 0 all are complete, 1 the printed ones are not, 2 wrong usage.
 """
 
 from __future__ import annotations
@@ -23,20 +23,20 @@ PIN = re.compile(r"^([A-Za-z0-9._-]+)==([^ ;\\]+)")
 
 
 def pins(requirements: str) -> dict[str, str]:
-    """Name and version of every package that a requirements file pins with `==`."""
+    """Returns the name and version of every package that a requirements file pins with `==`."""
     found = (PIN.match(line) for line in requirements.splitlines())
     return {match[1]: match[2] for match in found if match}
 
 
 def metadata_folder(name: str, site: pathlib.Path) -> pathlib.Path | None:
-    """The package's folder NAME-VERSION.dist-info, or None when it is not installed."""
+    """Returns the package's folder NAME-VERSION.dist-info, or None when it is not installed."""
     for distribution in importlib.metadata.distributions(name=name, path=[str(site)]):
         return pathlib.Path(distribution._path)  # the only way to a folder that may lack its METADATA
     return None
 
 
-def is_whole(folder: pathlib.Path) -> bool:
-    """True when every file that the package's RECORD lists is there in its full size. The contents are not read."""
+def is_complete(folder: pathlib.Path) -> bool:
+    """Returns True when every file that the package's RECORD lists exists and has its size. It reads no contents."""
     try:
         with open(folder / "RECORD", encoding="utf-8", newline="") as file:
             rows = list(csv.reader(file))
@@ -54,11 +54,12 @@ def is_whole(folder: pathlib.Path) -> bool:
 
 
 def forget_half_installed(pinned: dict[str, str], site: pathlib.Path) -> list[str]:
-    """Removes the metadata of packages that lack files, and what an interrupted pip left aside (folders `~...`)."""
+    """Removes the metadata of packages that lack files, and the folders `~...` that an interrupted pip leaves behind.
+    Returns the names of these packages."""
     broken = []
     for name in pinned:
         folder = metadata_folder(name, site)
-        if folder is not None and not is_whole(folder):
+        if folder is not None and not is_complete(folder):
             shutil.rmtree(folder)
             broken.append(name)
     for leftover in site.glob("~*"):
@@ -67,11 +68,11 @@ def forget_half_installed(pinned: dict[str, str], site: pathlib.Path) -> list[st
 
 
 def not_installed(pinned: dict[str, str], site: pathlib.Path) -> list[str]:
-    """The packages that are absent, of another version than the pinned one, or not whole."""
+    """Returns the names of the packages that are absent, incomplete, or of another version than the pinned one."""
     missing = []
     for name, version in pinned.items():
         folder = metadata_folder(name, site)
-        if folder is None or not is_whole(folder) or importlib.metadata.Distribution.at(folder).version != version:
+        if folder is None or not is_complete(folder) or importlib.metadata.Distribution.at(folder).version != version:
             missing.append(name)
     return missing
 

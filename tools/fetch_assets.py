@@ -1,8 +1,8 @@
-"""`make assets`: downloads the official files by their published names, verifies them and imports them.
+"""Implements `make assets`: downloads the official files by their published names, verifies them and imports them.
 
-Only the publishers' own pages are asked. A digest that a publisher states (Hugging Face does, for large files) has to
-match; otherwise the digest of the first use is written into a lock file, in the form that `sha256sum -c` reads, and has
-to match from then on.
+It downloads from the publishers' own pages only. Where the publisher states a digest (Hugging Face does for large
+files), the file must match it. The digest of every file is also recorded at its first use, in a lock file that
+`sha256sum -c` can read, and the file must match it from then on.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ import prima_import
 import safetensors_file
 import smal_import
 
-HUB = os.environ.get("HF_ENDPOINT", "https://huggingface.co").rstrip("/")  # HF_ENDPOINT: the hub's name for a mirror
+HUB = os.environ.get("HF_ENDPOINT", "https://huggingface.co").rstrip("/")  # the hub's own tools read HF_ENDPOINT, too
 TIMEOUT_S = 30
 CHUNK_BYTES = 1 << 20
 LOCK_NAME = "sha256.lock"
@@ -32,16 +32,16 @@ Say = Callable[[str], None]
 
 
 class Unavailable(Exception):
-    """A file that cannot be downloaded now."""
+    """A file cannot be downloaded now."""
 
 
 class Offline(Unavailable):
-    """The publisher cannot be reached, so other files need no try."""
+    """The publisher cannot be reached, so it is useless to try other files."""
 
 
 @dataclass(frozen=True)
 class Asset:
-    names: tuple[str, ...]  # as published; the first that exists is used
+    names: tuple[str, ...]  # the published names; the first that exists is used
     repository: str
     meaning: str
 
@@ -97,7 +97,7 @@ def run(folder: str, stage: str, training: bool, offline: bool, accept: bool, sa
 
 
 def _is_made_of(target: str, sources: Sequence[str]) -> bool:
-    """True when `target` names these files as its sources and is no older than they are."""
+    """Returns True when `target` names these files as its sources and is not older than they are."""
     if not os.path.exists(target):
         return False
     made_of = safetensors_file.read(target)[1].get(safetensors_file.SOURCE_KEY)
@@ -106,7 +106,7 @@ def _is_made_of(target: str, sources: Sequence[str]) -> bool:
 
 
 class Store:
-    """The folder of official files, with the digests of their first use."""
+    """The folder of official files and the digests that they had at their first use."""
 
     def __init__(self, folder: str, offline: bool, say: Say):
         self.folder = folder
@@ -119,7 +119,8 @@ class Store:
         return os.path.join(self.folder, name)
 
     def get(self, asset: Asset, optional: bool = False) -> Optional[str]:
-        """The path of a verified file, or None, which is noted in `missing` unless it is optional."""
+        """Returns the path of the verified file, downloading it if necessary. Returns None when that is impossible, and
+        then adds the file to `missing` unless it is optional."""
         for name in asset.names:
             if os.path.exists(self.path(name)):
                 self._verify(name, _digest(self.path(name)))
@@ -138,7 +139,7 @@ class Store:
         return None
 
     def _download(self, repository: str, name: str) -> bool:
-        """False when the repository has no such file."""
+        """Downloads and verifies a file. Returns False when the repository has no such file."""
         published = _published_digest(repository, name)
         response = _open(f"{HUB}/{repository}/resolve/main/{name}")
         if response is None:
@@ -148,8 +149,8 @@ class Store:
             digest = self._receive(response, name, partial)
             if published and digest != published:
                 raise prima_import.ImportFault(
-                    f"{name}: SHA-256 {digest}, but its publisher says {published}; run it again, and if it stays so, "
-                    "do not use the file"
+                    f"{name}: SHA-256 {digest}, but its publisher states {published}; download it again, and if they "
+                    "still differ, do not use the file"
                 )
             self._verify(name, digest, published)
             os.replace(partial, self.path(name))
@@ -181,19 +182,21 @@ class Store:
         if name in known:
             if known[name] != digest:
                 raise prima_import.ImportFault(
-                    f"{self.path(name)}: SHA-256 {digest}, but {known[name]} at its first use ({lock}). If you "
-                    "replaced the file on purpose, remove its line there"
+                    f"{self.path(name)}: SHA-256 {digest}, but it was {known[name]} at its first use ({lock}). If "
+                    "you replaced the file on purpose, remove its line there"
                 )
             self.say(f"{name}: SHA-256 as in {lock}")
             return
         with open(lock, "a", encoding="utf-8") as file:
             file.write(f"{digest}  {name}\n")
-        origin = "as published" if published else f"no published digest is known: recorded in {lock} at this first use"
+        first_use = f"recorded in {lock} at this first use, since no published digest is known"
+        origin = "as published" if published else first_use
         self.say(f"{name}: SHA-256 {digest}, {origin}")
 
 
 def _published_digest(repository: str, name: str) -> Optional[str]:
-    """The hub keeps large files beside the repository; the repository itself holds a pointer with the digest."""
+    """Returns the SHA-256 that the hub states for a file, or None. The hub stores large files outside the repository,
+    which holds a pointer with the digest instead."""
     response = _open(f"{HUB}/{repository}/raw/main/{name}")
     if response is None:
         return None
@@ -204,7 +207,7 @@ def _published_digest(repository: str, name: str) -> Optional[str]:
 
 
 def _open(url: str):
-    """The response, or None when there is no such file. Throws Unavailable."""
+    """Returns the response, or None when there is no such file. Throws Unavailable."""
     request = urllib.request.Request(url, headers={"User-Agent": "quadruped3d-import-assets"})
     try:
         return urllib.request.urlopen(request, timeout=TIMEOUT_S)

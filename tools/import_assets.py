@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Turns the official files (network weights, body model, priors) into the plain safetensors files that the toolkit
-reads. Nothing in an official file is executed: see restricted_pickle.py. docs/assets.md says where the files are from.
+"""Converts the official files (network weights, body model, priors) to the plain safetensors files that the toolkit
+reads. It executes nothing that an official file contains (restricted_pickle.py). docs/assets.md says where to get the
+files.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ def main(arguments=None) -> int:
     try:
         return options.run(options) or 0
     except KeyboardInterrupt:
-        print("import_assets: stopped; nothing half-written is left", file=sys.stderr)
+        print("import_assets: interrupted; no incomplete file is left", file=sys.stderr)
         return INTERRUPTED
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
@@ -109,7 +110,7 @@ def _parser() -> argparse.ArgumentParser:
         prog="import_assets.py",
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
-        epilog="""Most people need one command, which fetches what is missing and imports it:
+        epilog="""One command fetches the missing files and imports them:
   make assets
 
 By hand:
@@ -145,7 +146,7 @@ def _add_weight_files(added: argparse.ArgumentParser, what: str) -> None:
     added.add_argument("input", metavar="IN", help=what)
     added.add_argument("output", metavar="OUT", help="safetensors file to write")
     added.add_argument(
-        "--skip-crc", action="store_true", help="do not compare the zip's check sums (files saved without them)"
+        "--skip-crc", action="store_true", help="do not compare the zip's check sums (for files that have none)"
     )
 
 
@@ -157,18 +158,18 @@ def _add_checkpoint(commands) -> None:
         "import the network from a Lightning checkpoint",
         """  import_assets.py checkpoint s1ckpt_inference.ckpt assets/prima.safetensors
 
-All 955 tensors of the official state dict find their place, or every one that is missing, extra or of a wrong shape
-is named and nothing is written. The network's sizes come from the weights' shapes. What no shape tells (attention
-heads, IEF iterations, focal length, quick GELU) comes from --set, --config, the file's hyperparameters, or the
-official values, in this order; the output says which:
+Either all 955 tensors of the official state dict fit, or the command names every tensor that is missing, extra or of a
+wrong shape, and writes nothing. The network's sizes come from the shapes of the weights. The shapes do not determine
+the attention heads, IEF iterations, focal length and quick GELU. These come from --set, --config, the file's
+hyperparameters, or the official values, in this order; the output says which:
   import_assets.py checkpoint mine.ckpt mine.safetensors --set heads=4 --set dec_heads=4 --set clip_heads=4""",
     )
     _add_weight_files(added, "Lightning checkpoint (*.ckpt)")
-    added.add_argument("--open-clip-config", metavar="JSON", help="BioCLIP's open_clip_config.json: quick GELU, heads")
+    added.add_argument("--open-clip-config", metavar="JSON", help="BioCLIP's config, for quick GELU and heads")
     added.add_argument("--config", metavar="JSON", help="file with config values, for example {\"ief_iterations\": 3}")
-    added.add_argument("--set", type=_setting, action="append", default=[], metavar="KEY=VALUE", help="one such value")
-    added.add_argument("--keep-text", action="store_true", help="keep CLIP's text tower, which nothing uses (254 MB)")
-    added.add_argument("--drop", action="append", default=[], metavar="PREFIX", help="leave out unknown tensors")
+    added.add_argument("--set", type=_setting, action="append", default=[], metavar="KEY=VALUE", help="a config value")
+    added.add_argument("--keep-text", action="store_true", help="keep CLIP's unused text tower (254 MB)")
+    added.add_argument("--drop", action="append", default=[], metavar="PREFIX", help="leave out these unknown tensors")
 
 
 def _add_smal(commands) -> None:
@@ -209,12 +210,12 @@ def _add_parts(commands) -> None:
   import_assets.py bioclip open_clip_pytorch_model.bin --open-clip-config open_clip_config.json \\
       --into assets/fresh.safetensors assets/start.safetensors
 
-For training from scratch; the official checkpoint holds its BioCLIP already. Whether the tower uses quick GELU, and
-its number of heads, come from open_clip_config.json.""",
+This is for training from scratch; the official checkpoint already holds BioCLIP. The open_clip_config.json says whether
+the tower uses quick GELU, and how many heads it has.""",
     )
     _add_weight_files(added, "open_clip_pytorch_model.bin or open_clip_model.safetensors")
     added.add_argument("--open-clip-config", required=True, metavar="JSON", help="open_clip_config.json beside it")
-    added.add_argument("--into", required=True, metavar="CHECKPOINT", help="safetensors checkpoint with all the rest")
+    added.add_argument("--into", required=True, metavar="CHECKPOINT", help="safetensors file with the other tensors")
 
     added = _command(
         commands,
@@ -223,10 +224,10 @@ its number of heads, come from open_clip_config.json.""",
         "put AniMer's ViT into a checkpoint",
         """  import_assets.py backbone amr_vitbb.pth --into assets/fresh.safetensors assets/start.safetensors
 
-For training from scratch, as in the paper. Only backbone.* is taken.""",
+This is for training from scratch, as in the paper. The command uses only the tensors backbone.*.""",
     )
     _add_weight_files(added, "AniMer checkpoint (amr_vitbb.pth)")
-    added.add_argument("--into", required=True, metavar="CHECKPOINT", help="safetensors checkpoint with all the rest")
+    added.add_argument("--into", required=True, metavar="CHECKPOINT", help="safetensors file with the other tensors")
 
 
 def _add_fetch(commands) -> None:
@@ -234,10 +235,10 @@ def _add_fetch(commands) -> None:
         commands,
         "fetch",
         _fetch,
-        "download what is missing, verify it and import it (make assets)",
+        "download the missing files, verify and import them (make assets)",
         """  import_assets.py fetch                 the Stage 1 network, the body, the priors, into assets/
   import_assets.py fetch --stage 3       the Stage 3 network instead
-  import_assets.py fetch --offline       only verify and import what lies in assets/official
+  import_assets.py fetch --offline       only verify and import the files in assets/official
 
 It shows the terms of the files and asks whether you accept them; --accept-licences accepts them without asking, and
 without a terminal that is the only way (exit code 2 otherwise). Without a network it says which files to put where.""",

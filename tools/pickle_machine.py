@@ -1,4 +1,7 @@
-"""The stack machine behind restricted_pickle.py, without its side effects: objects are made as records."""
+"""The stack machine behind restricted_pickle.py.
+
+It has no side effects: where Python would create an object, it creates a record that describes the object.
+"""
 
 from __future__ import annotations
 
@@ -8,16 +11,16 @@ from pickle_names import BrokenPickle, Global, RefusedPickle, is_class_name, mak
 
 
 class Record:
-    """An object of a class that was not imported."""
+    """Describes an object whose class was not imported."""
 
     __slots__ = ("cls", "args", "state", "entries", "elements")
 
     def __init__(self, cls: Global, args: tuple):
         self.cls = cls
-        self.args = args  # what its constructor, or __new__, would have got
-        self.state = None  # what __setstate__ would have got
-        self.entries: dict = {}  # the items of a dict's subclass
-        self.elements: list = []  # the items of a list's or set's subclass
+        self.args = args  # the arguments that its constructor or __new__ would receive
+        self.state = None  # the argument that __setstate__ would receive
+        self.entries: dict = {}  # the items, if the class is a subclass of dict
+        self.elements: list = []  # the items, if the class is a subclass of list or set
 
     @property
     def path(self) -> str:
@@ -28,7 +31,7 @@ class Record:
 
 
 class Machine:
-    """A stack, marks on it, and a memo: the pickle language without its side effects."""
+    """The state of an unpickler: a stack, marks on the stack, and a memo."""
 
     def __init__(self, data: memoryview, persistent: Optional[Callable[[object], object]]):
         self.data = data
@@ -41,7 +44,7 @@ class Machine:
         self.stopped = False
 
     def result(self):
-        """The one object that is left at the end."""
+        """Returns the object that the pickle describes. It must be the only one left on the stack."""
         value = self.pop()
         if self.stack or self.marks:
             raise BrokenPickle("the pickle ends with unused objects on its stack")
@@ -49,7 +52,7 @@ class Machine:
             raise BrokenPickle(f"{len(self.data) - self.position} bytes follow the end of the pickle")
         return value
 
-    # Input.
+    # --- input ---
 
     def take(self, count: int) -> memoryview:
         left = len(self.data) - self.position
@@ -78,7 +81,7 @@ class Machine:
     def text_line(self) -> str:
         return decode(self.line(), "ascii")
 
-    # The stack.
+    # --- the stack ---
 
     def push(self, value) -> None:
         self.stack.append(value)
@@ -111,28 +114,29 @@ class Machine:
             raise BrokenPickle(f"recalls object {index}, which was never stored")
         self.push(self.memo[index])
 
-    # Objects.
+    # --- objects ---
 
     def call(self, target, args) -> Record:
-        """What a call would make, as a record. Refuses what looks like a function instead of a class."""
+        """Returns a record of the object that a call would create. Throws RefusedPickle when the target does not look
+        like a class."""
         if not isinstance(target, Global):
-            raise RefusedPickle(f"calls {short(target)}, which is no class")
+            raise RefusedPickle(f"calls {short(target)}, which is not a class")
         if not isinstance(args, tuple):
-            raise RefusedPickle(f"calls {target.path} with {short(args)} in the place of arguments")
+            raise RefusedPickle(f"calls {target.path} with {short(args)} as its arguments")
         match target.path, args:
             case "copyreg._reconstructor", (Global() as cls, Global() as base, content):  # protocols 0 and 1
                 return Record(cls, () if base.path == "builtins.object" else (content,))
             case "copyreg.__newobj__", (Global() as cls, *rest):
                 return Record(cls, tuple(rest))
             case "builtins.getattr", (Global() as enum, str() as member) if is_class_name(enum.name):
-                return Record(enum, (member,))  # how Python 3.11 makes a member of an Enum
+                return Record(enum, (member,))  # Python 3.11 pickles a member of an Enum in this way
         if not makes_values(target):
             raise RefusedPickle(f"calls {target.path}, which is unknown and does not look like a class")
         return Record(target, args)
 
     def build(self, target, state) -> None:
         if not isinstance(target, Record):
-            raise RefusedPickle(f"sets the state of {short(target)}, which takes none")
+            raise RefusedPickle(f"sets the state of {short(target)}, which has no state")
         if target.state is not None:
             raise RefusedPickle(f"sets the state of one {target.path} twice")
         target.state = state
@@ -142,14 +146,14 @@ class Machine:
             raise BrokenPickle("sets a key that has no value")
         entries = target.entries if isinstance(target, Record) else target
         if not isinstance(entries, dict):
-            raise RefusedPickle(f"sets items of {short(target)}, which has none")
+            raise RefusedPickle(f"sets items of {short(target)}, which is not a dict")
         for key, value in zip(values[::2], values[1::2]):
             entries[checked_key(key)] = value
 
     def append(self, target, values: list) -> None:
         elements = target.elements if isinstance(target, Record) else target
         if not isinstance(elements, list):
-            raise RefusedPickle(f"appends to {short(target)}, which is no list")
+            raise RefusedPickle(f"appends to {short(target)}, which is not a list")
         elements.extend(values)
 
     def identify(self, identity) -> None:
@@ -159,7 +163,7 @@ class Machine:
 
 
 def checked_key(key):
-    """Keys are hashed, and hashing runs on nested keys without a limit, so they have to be flat."""
+    """Returns the key if it is safe to hash. Hashing recurses without a limit, so nested keys are refused."""
     scalars = (str, bytes, bool, float, type(None), Global, Record)
     for part in key if isinstance(key, tuple) else (key,):
         # Large integers with equal remainders would all fall into one bucket.
@@ -176,7 +180,7 @@ def decode(raw: bytes, encoding: str) -> str:
 
 
 def short(value: object) -> str:
-    """A bounded description for messages."""
+    """Describes a value for a message, in a bounded number of characters."""
     if isinstance(value, (str, bytes)):
         text = repr(value[:60])
         return text if len(value) <= 60 else text + "..."

@@ -1,4 +1,8 @@
-"""Which names a pickle may mention and call. Nothing is ever imported, so this list is no wall: it is the alarm."""
+"""Decides which names a pickle may mention and call.
+
+The unpickler never imports anything, so these lists are not what makes it safe. They detect a file that asks for
+something that data never needs, and the user is told about it.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +13,7 @@ MAX_NAME_LENGTH = 256
 
 
 class BrokenPickle(ValueError):
-    """The bytes are not a whole pickle, or not of the expected content."""
+    """The bytes are not a complete pickle, or the pickle does not hold what was expected."""
 
 
 class RefusedPickle(ValueError):
@@ -18,7 +22,7 @@ class RefusedPickle(ValueError):
 
 @dataclass(frozen=True)
 class Global:
-    """The name of a class or function. Python 2's names of modules are given as Python 3's."""
+    """The name of a class or function. Modules that Python 3 renamed have their new name."""
 
     module: str
     name: str
@@ -28,8 +32,8 @@ class Global:
         return f"{self.module}.{self.name}"
 
 
-# Modules that run programs or code, load them, or reach files and networks. No array, tensor or setting is made of
-# them, so their mere mention is refused.
+# These modules run programs, load code, or access files and networks. No array, tensor or setting needs them, so a
+# pickle that only mentions one of them is refused.
 _PROGRAM_MODULES = frozenset(
     "os posix nt subprocess commands popen2 pty sys importlib imp pkgutil runpy zipimport shutil socket ssl "
     "ctypes _ctypes codeop pdb bdb timeit pickle cPickle _pickle dill cloudpickle joblib marshal operator "
@@ -37,7 +41,7 @@ _PROGRAM_MODULES = frozenset(
     "ftplib smtplib requests httpx aiohttp io _io pip setuptools distutils ensurepip venv sqlite3".split()
 )
 
-# Of these modules, only what is plain data.
+# From these modules only the names of plain data are accepted.
 _DATA_NAMES = {
     "builtins": frozenset(
         "object dict list tuple set frozenset int long float complex bool str unicode bytes bytearray range slice "
@@ -51,7 +55,7 @@ _DATA_NAMES = {
 
 _PYTHON2_MODULES = {"__builtin__": "builtins", "copy_reg": "copyreg"}
 
-# Names in lower case that pickles call to make values. Every other called name has to look like a class.
+# Functions that pickles call to create plain values. Every other name that is called must look like a class.
 _VALUE_MAKERS = frozenset(
     [f"builtins.{name}" for name in _DATA_NAMES["builtins"] if name != "getattr"]
     + [
@@ -83,16 +87,16 @@ _NAME = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*", re.ASCII)
 def check_name(module: object, name: object) -> Global:
     for text in (module, name):
         if not isinstance(text, str) or len(text) > MAX_NAME_LENGTH or not _NAME.fullmatch(text):
-            raise RefusedPickle(f"a global with the name {str(text)[:60]!r}, which is no Python name")
+            raise RefusedPickle(f"a global with the name {str(text)[:60]!r}, which is not a Python name")
     found = Global(_PYTHON2_MODULES.get(module, module), name)
     if found.module.partition(".")[0] in _PROGRAM_MODULES:
-        raise RefusedPickle(f"names {found.path}, which can run programs or reach files")
+        raise RefusedPickle(f"names {found.path}, which can run programs or access files")
     allowed = _DATA_NAMES.get(found.module)
     if allowed is not None:
         if name not in allowed:
-            raise RefusedPickle(f"names {found.path}, which is no plain data")
+            raise RefusedPickle(f"names {found.path}, which is not plain data")
     elif any(part.startswith("__") for part in name.split(".")):
-        raise RefusedPickle(f"names {found.path}, which reaches inside a class")
+        raise RefusedPickle(f"names {found.path}, which is an internal of a class")
     return found
 
 
@@ -101,6 +105,6 @@ def is_class_name(name: str) -> bool:
 
 
 def makes_values(target: Global) -> bool:
-    """True for what a pickle may call: what looks like a class, and the known makers of plain values."""
+    """True when a pickle may call the target: it looks like a class, or it is known to create plain values."""
     rebuilds = target.module == "torch._utils" and target.name.startswith("_rebuild_")
     return rebuilds or target.path in _VALUE_MAKERS or is_class_name(target.name)

@@ -1,6 +1,6 @@
-"""Turns records of numpy, chumpy and scipy objects (see restricted_pickle.py) into numpy arrays.
+"""Converts records of numpy, chumpy and scipy objects (see restricted_pickle.py) to numpy arrays.
 
-Every size is checked against the bytes that are there before an array is made.
+Before it creates an array, it compares the array's size with the number of bytes in the record.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ import numpy as np
 
 from restricted_pickle import BrokenPickle, Global, Record
 
-# Official SMAL tables have at most 3.6 million numbers. A sparse matrix names any shape in a few bytes.
+# The largest table in the official SMAL files has 3.6 million numbers. The limit is needed because a sparse matrix can
+# declare any shape in a few bytes.
 MAX_DENSE_ELEMENTS = 1 << 26
 
 _NUMPY_MAKERS = re.compile(r"numpy\.(_?core)\.(multiarray|numeric)\.(_reconstruct|_frombuffer|scalar)")
@@ -21,8 +22,8 @@ _PLAIN_DTYPE = re.compile(r"[<>|=]?(b1|[iu][1248]|f[248])")
 
 
 def array(value, what: str) -> np.ndarray:
-    """The array that `value` stands for: a numpy array or scalar, a chumpy array that stores its numbers, a number,
-    or a (nested) list of these with equal shapes. Throws BrokenPickle naming `what`."""
+    """Returns the array that `value` describes: a numpy array or scalar, a chumpy array that stores its numbers, a
+    number, or a (nested) list of these with equal shapes. Throws BrokenPickle, whose message names `what`."""
     if isinstance(value, Record):
         if value.path == "chumpy.ch.Ch":
             return array(_chumpy_numbers(value, what), what)
@@ -37,18 +38,19 @@ def array(value, what: str) -> np.ndarray:
             return np.asarray(value, np.float64 if isinstance(value, float) else np.int64)
         return np.stack([array(item, f"{what}[{i}]") for i, item in enumerate(value)])
     except (ValueError, OverflowError, RecursionError) as error:
-        raise BrokenPickle(f"{what} is no rectangular table of numbers: {error}") from None
+        raise BrokenPickle(f"{what} is not a rectangular table of numbers: {error}") from None
 
 
 def matrix(value, what: str) -> np.ndarray:
-    """As array(), and scipy's csc, csr and coo matrices too, filled out with zeros. Repeated entries add up."""
+    """Does the same as array(), and also accepts scipy's csc, csr and coo matrices, which it returns as dense arrays.
+    Repeated entries of a sparse matrix are added up."""
     if isinstance(value, Record) and _SPARSE_CLASS.fullmatch(value.path):
         return _dense(value, what)
     return array(value, what)
 
 
 def _chumpy_numbers(record: Record, what: str):
-    """chumpy keeps the numbers of a plain array in `x`; an array computed from others has none."""
+    """Returns the numbers of a chumpy array. chumpy stores them in `x`, unless it computes the array from others."""
     state = record.state if isinstance(record.state, dict) else {}
     if "x" not in state:
         raise BrokenPickle(f"{what} is a chumpy array without stored numbers (no 'x' in its state)")
@@ -59,7 +61,7 @@ def _chumpy_numbers(record: Record, what: str):
 
 
 def _dtype(value, what: str) -> np.dtype:
-    """numpy writes a dtype as dtype('f8', align, copy), then its state (version, byte order, ...)."""
+    """Returns the dtype of a record: dtype('f8', align, copy) with the state (version, byte order, ...)."""
     if not isinstance(value, Record) or value.path != "numpy.dtype" or not value.args:
         raise BrokenPickle(f"{what} has no numpy dtype")
     code = value.args[0]
@@ -70,7 +72,8 @@ def _dtype(value, what: str) -> np.dtype:
 
 
 def _bytes(value, what: str) -> bytes:
-    """Raw numbers: bytes, a Python 2 string, or, from Python 3 in protocol 2, encode(text, 'latin1') and bytes()."""
+    """Returns the raw bytes of numbers. A pickle holds them as bytes, as a Python 2 string, or, if Python 3 wrote it in
+    protocol 2, as a call of encode(text, 'latin1') or bytes()."""
     if isinstance(value, Record) and value.path == "builtins.bytes" and value.args == ():
         return b""
     if isinstance(value, Record) and value.path in ("_codecs.encode", "codecs.encode") and len(value.args) == 2:
@@ -97,11 +100,11 @@ def _shaped(raw: bytes, dtype: np.dtype, shape, fortran: bool, what: str) -> np.
 
 
 def _reconstructed(record: Record, what: str) -> np.ndarray:
-    """An empty array and then its state: ([version,] shape, dtype, is_fortran, bytes)."""
+    """Returns an array that was pickled as an empty one with the state ([version,] shape, dtype, is_fortran, bytes)."""
     cls = record.args[0] if record.args else None
     state = record.state
     if cls != Global("numpy", "ndarray") or not isinstance(state, tuple) or len(state) not in (4, 5):
-        raise BrokenPickle(f"{what} is no complete numpy array")
+        raise BrokenPickle(f"{what} is not a complete numpy array")
     shape, described, fortran, raw = state[-4:]
     dtype = _dtype(described, what)
     return _shaped(_bytes(raw, what), dtype, shape, bool(fortran), what)
@@ -109,14 +112,14 @@ def _reconstructed(record: Record, what: str) -> np.ndarray:
 
 def _from_buffer(record: Record, what: str) -> np.ndarray:
     if len(record.args) != 4:
-        raise BrokenPickle(f"{what} is no complete numpy array")
+        raise BrokenPickle(f"{what} is not a complete numpy array")
     raw, dtype, shape, order = record.args
     return _shaped(_bytes(raw, what), _dtype(dtype, what), shape, order == "F", what)
 
 
 def _scalar(record: Record, what: str) -> np.ndarray:
     if len(record.args) != 2:
-        raise BrokenPickle(f"{what} is no complete numpy number")
+        raise BrokenPickle(f"{what} is not a complete numpy scalar")
     return _shaped(_bytes(record.args[1], what), _dtype(record.args[0], what), (), False, what)
 
 
@@ -160,7 +163,7 @@ def _inside(index: np.ndarray, size: int) -> bool:
 
 
 def _expand(starts: np.ndarray, minors: np.ndarray, majors: int, count: int, what: str):
-    """(major, minor) index of each number, from where each major row or column starts."""
+    """Returns the major and the minor index of each number. starts: where each row (csr) or column (csc) begins."""
     whole = starts.dtype.kind in "iu" and len(starts) == majors + 1 and int(starts[0]) == 0
     lengths = np.diff(starts.astype(np.int64)) if whole else np.array([-1])
     if lengths.min() < 0 or int(starts[-1]) != count:

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Rewrites tools/requirements.txt: every wheel that tools/requirements.in needs, by version and SHA-256.
+"""Writes tools/requirements.txt: the version and SHA-256 of every wheel that tools/requirements.in needs.
 
-Run it after changing requirements.in, and review the difference. It asks pip to resolve for each Python and machine of
-TARGETS, without installing anything; an index that offers no metadata of its own makes pip download the wheels for
-that, about 3 GB for each target. pip keeps nothing in its cache.
+Run it after changing requirements.in, and review the difference. It asks pip to resolve the requirements for each of
+PYTHONS on each of MACHINES, without installing anything. Where the package index does not offer the wheels' metadata,
+pip has to download the wheels: about 3 GB for each combination.
 """
 
 from __future__ import annotations
@@ -23,8 +23,11 @@ GLIBC_MINOR = 36  # Debian 12 has glibc 2.36, Ubuntu 24.04 has 2.39
 
 
 def resolve(python: str, machine: str) -> dict[str, tuple[str, str, str]]:
-    """Name -> (version, file name of the wheel, its SHA-256). Environment markers are those of the Python that runs
-    this, which decides nothing as long as no marker asks for the Python's version or the machine."""
+    """Returns {name: (version, file name of the wheel, its SHA-256)}.
+
+    pip evaluates environment markers for the Python that runs this script, not for the target. The result is right as
+    long as no requirement depends on the version of Python or on the machine. Throws CalledProcessError.
+    """
     platforms = [f"manylinux_2_{minor}_{machine}" for minor in range(5, GLIBC_MINOR + 1)] + [f"manylinux2014_{machine}"]
     with tempfile.TemporaryDirectory() as folder:
         report = pathlib.Path(folder) / "report.json"
@@ -45,7 +48,7 @@ def resolve(python: str, machine: str) -> dict[str, tuple[str, str, str]]:
 
 
 def render(resolved: list[dict[str, tuple[str, str, str]]]) -> str:
-    """The text of requirements.txt. Throws ValueError when a package has another version for another target."""
+    """Returns the text of requirements.txt. Throws ValueError when a package has different versions on the targets."""
     lines = [
         f"# CPython {', '.join(PYTHONS)} on Linux ({', '.join(MACHINES)})",
         "# tools/pin_wheels.py writes this file from requirements.in. pip accepts these wheels and no others.",

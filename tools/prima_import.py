@@ -1,5 +1,7 @@
-"""Official network weights -> one safetensors file under the official names, with the network's sizes in its metadata
-("prima_config", see model/checkpoint.h): the Lightning checkpoint, BioCLIP from OpenCLIP, AniMer's backbone.
+"""Imports official network weights: the Lightning checkpoint, BioCLIP from OpenCLIP, and AniMer's backbone.
+
+The result is a safetensors file with the official tensor names. Its metadata holds the network's config
+("prima_config", see model/checkpoint.h).
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ Say = Callable[[str], None]
 
 
 class ImportFault(ValueError):
-    """Files that do not fit: what, where, got, expected, what to do."""
+    """A file does not fit the network. The message says what, where, what was found, what was expected, what to do."""
 
 
 # --- the Lightning checkpoint --------------------------------------------------------------------------------------
@@ -38,9 +40,12 @@ def import_checkpoint(
     drop: Sequence[str] = (),
     check_sums: bool = True,
 ) -> None:
-    """settings: config values that replace what the file tells. open_clip_config: the path of BioCLIP's config. drop:
-    prefixes of names to leave out although nothing is known of them. Throws ImportFault, TensorFileError,
-    BrokenPickle, RefusedPickle and OSError, and then writes nothing."""
+    """Converts a Lightning checkpoint, or a bare state dict, to a safetensors file.
+
+    settings: config values that take precedence over those of the file. open_clip_config: path of BioCLIP's config.
+    keep_text: keep CLIP's text tower. drop: prefixes of unknown tensors to leave out. check_sums: compare the zip's
+    check sums. Throws ImportFault, TensorFileError, BrokenPickle, RefusedPickle and OSError, and then writes nothing.
+    """
     file = TorchFile(source, check_sums)
     root = _entries(file.root) or {}
     tensors = file.tensors(root.get("state_dict", file.root), "state_dict")
@@ -69,12 +74,12 @@ def import_checkpoint(
     if absent := sorted({item.group for item in expected.values()} - set(groups) - {names.TEXT}):
         say(f"  not in the file, and not needed to predict: {', '.join(absent)}")
     say("  sizes: " + " ".join(f"{key}={config[key]}" for key in config if key not in names.FREE_KEYS))
-    say("  not told by the weights: " + " ".join(f"{key}={config[key]} ({origin[key]})" for key in names.FREE_KEYS))
+    say("  not given by the weights: " + " ".join(f"{key}={config[key]} ({origin[key]})" for key in names.FREE_KEYS))
 
 
 def find_faults(tensors: Mapping[str, Tensor], expected: Mapping[str, names.Expected]) -> list[str]:
-    """Every expected tensor that is missing, or has another shape or dtype. The network has to be whole; each other
-    group has to be whole or absent."""
+    """Lists the expected tensors that are missing or have another shape or dtype, one message each. The network must be
+    complete; every other group must be complete or absent."""
     present = {expected[name].group for name in tensors if name in expected} | {names.NETWORK}
     faults = []
     for name, item in expected.items():
@@ -92,7 +97,7 @@ def find_faults(tensors: Mapping[str, Tensor], expected: Mapping[str, names.Expe
 
 
 def _apply_settings(config: dict, settings: Mapping, hyperparameters) -> dict[str, str]:
-    """Fills in what shapes do not tell, and says for each such key where its value is from."""
+    """Sets the values that the shapes do not determine. Returns the origin of each such value."""
     origin = {key: "official" for key in names.FREE_KEYS}
     places = {
         "ief_iterations": ("MODEL", "SMAL_HEAD", "IEF_ITERS"),
@@ -129,8 +134,8 @@ def _same_kind(value, like) -> bool:
 
 
 def _setting(node, place: Sequence[str]):
-    """A value in the hyperparameters, which were read as data: dicts, yacs nodes (dicts with records around them) or
-    omegaconf nodes (their state holds `_content` and, in the leaves, `_val`). None when it is not there."""
+    """Returns a value of the hyperparameters, or None when it is absent. They may be dicts, yacs nodes (records with
+    dict items), or omegaconf nodes (records whose state holds `_content` and, in the leaves, `_val`)."""
     node = (_entries(node) or {}).get("cfg", node)
     for key in place:
         node = (_entries(node) or {}).get(key)
@@ -140,18 +145,18 @@ def _setting(node, place: Sequence[str]):
 
 
 def _entries(node):
-    """The dict that a node is or stands for, else None."""
+    """Returns the dict that a node is, or that its record describes; otherwise None."""
     if isinstance(node, Record):
         content = node.state.get("_content") if isinstance(node.state, dict) else None
         return content if isinstance(content, dict) else node.entries
     return node if isinstance(node, dict) else None
 
 
-# --- parts from elsewhere ------------------------------------------------------------------------------------------
+# --- parts of other networks ------------------------------------------------------------------------------------------
 
 
 def import_backbone(source: str, base: str, target: str, say: Say, check_sums: bool = True) -> None:
-    """Replaces the ViT of the checkpoint `base` by that of `source` (AniMer's backbone.*, with or without prefix)."""
+    """Replaces the ViT in the checkpoint `base` by AniMer's in `source` (backbone.*, with or without this prefix)."""
     tensors = _load(source, check_sums)
     prefix = "backbone."
     found = {name: tensor for name, tensor in tensors.items() if name.startswith(prefix)}
@@ -163,7 +168,7 @@ def import_backbone(source: str, base: str, target: str, say: Say, check_sums: b
 def import_bioclip(
     source: str, open_clip_config: str, base: str, target: str, say: Say, check_sums: bool = True
 ) -> None:
-    """Replaces the BioCLIP encoder of the checkpoint `base` by the image tower of an OpenCLIP file."""
+    """Replaces the BioCLIP encoder in the checkpoint `base` by the image tower of an OpenCLIP file."""
     tensors = _load(source, check_sums)
     prefix = names.CLIP + "visual."
     found = {names.CLIP + name: tensor for name, tensor in tensors.items() if name.startswith("visual.")}
@@ -174,8 +179,11 @@ def import_bioclip(
 
 
 def _open_clip_settings(path: str, sizes: Mapping) -> dict:
-    """open_clip_config.json: {"model_cfg": {"quick_gelu": ..., "vision_cfg": {"width", "layers", "head_width"}}}.
-    OpenCLIP's defaults: no quick GELU, 64 channels a head."""
+    """Reads quick GELU and the number of heads from an open_clip_config.json, and checks that it fits the weights.
+
+    Its form is {"model_cfg": {"quick_gelu": ..., "vision_cfg": {"width", "layers", "head_width"}}}. OpenCLIP's defaults
+    are the ordinary GELU and 64 channels per head.
+    """
     try:
         with open(path, encoding="utf-8") as file:
             root = json.load(file)
@@ -190,7 +198,7 @@ def _open_clip_settings(path: str, sizes: Mapping) -> dict:
         raise ImportFault(f"{path}: model_cfg.quick_gelu is {quick_gelu!r}, expected true or false")
     for key, value in told.items():
         if value != sizes[key]:
-            raise ImportFault(f"{path}: {key} is {value} there, but {sizes[key]} in the weights: of another model?")
+            raise ImportFault(f"{path}: {key} is {value}, but {sizes[key]} in the weights: is it of another model?")
     if patch != names.PATCH_PX or not isinstance(head_width, int) or head_width < 1:
         raise ImportFault(f"{path}: patch_size {patch}, head_width {head_width}; expected {names.PATCH_PX} and a width")
     return {"clip_quick_gelu": quick_gelu, "clip_heads": sizes["clip_width"] // head_width}
@@ -208,13 +216,13 @@ def _load(path: str, check_sums: bool) -> dict[str, Tensor]:
 def _merge(
     source: str, found: dict, base: str, target: str, prefix: str, sizes: Mapping, say: Say, ignored: int
 ) -> None:
-    """Writes `base` with `found` in the place of its tensors prefix*, and with `sizes` in its config."""
+    """Writes a copy of `base` whose tensors prefix* are replaced by `found`, with `sizes` in its config."""
     tensors, metadata = safetensors_file.read(base)
     try:
         config = names.OFFICIAL_CONFIG | json.loads(metadata[CONFIG_KEY])
     except (KeyError, ValueError, TypeError):
         raise ImportFault(
-            f"{base}: no '{CONFIG_KEY}' in its metadata; make it with `import_assets.py checkpoint` or with "
+            f"{base}: no '{CONFIG_KEY}' in its metadata; create the file with `import_assets.py checkpoint` or with "
             "`quadruped3d init --size vith`"
         ) from None
     config.update(sizes)
@@ -228,7 +236,7 @@ def _merge(
     merged.update({name: found[name] for name in wanted})
     network = {name: item for name, item in expected.items() if item.group == names.NETWORK}
     if faults := find_faults({name: merged[name] for name in network if name in merged}, network):
-        raise ImportFault(_fault_list(base, faults, f"The rest of it does not fit {source}."))
+        raise ImportFault(_fault_list(base, faults, f"The other tensors of this file do not fit {source}."))
     order = [name for name in expected if name in merged] + [name for name in merged if name not in expected]
     safetensors_file.write(target, {name: merged[name] for name in order}, metadata | {CONFIG_KEY: json.dumps(config)})
     say(f"{target}: {len(wanted)} tensors {prefix}* from {source}, {len(merged) - len(wanted)} from {base}")

@@ -1,6 +1,8 @@
-"""The official checkpoint's tensors: names and shapes for any sizes of the network, and the sizes from the shapes.
+"""Lists the tensors of the official checkpoint, with their names and shapes, for a network of any size.
 
-At the paper's sizes these are the 955 tensors of the released model's state dict.
+It also derives the size of a network from the shapes of its tensors.
+
+At the paper's size, the list has the 955 tensors of the released model's state dict.
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ CLIP_TOKENS = 14 * 14
 PATCH_PX = 16
 POSE_6D, CAMERA = 6 * JOINTS, 3
 
-# The network's config as the C++ side knows it (model/config.h), at the paper's sizes.
+# The network's config at the paper's size, with the keys of the C++ code (model/config.h).
 OFFICIAL_CONFIG = {
     "embed_dim": 1280,
     "depth": 32,
@@ -36,15 +38,15 @@ OFFICIAL_CONFIG = {
     "drop_path": 0.55,
     "dropout": 0.1,
 }
-# What no weight's shape tells.
+# The keys whose values cannot be derived from the shapes of the weights.
 FREE_KEYS = tuple("heads clip_heads dec_heads clip_quick_gelu ief_iterations focal_px drop_path dropout".split())
 
-# CLIP's text tower, which the network does not use but the official state dict holds.
+# The size of CLIP's text tower. The official state dict has it, but the network does not use it.
 OFFICIAL_TEXT = {"width": 512, "layers": 12, "tokens": 77, "vocabulary": 49408}
 
 CLIP = "bioclip_embedding.species_model."
 
-# Groups of tensors. The network's are needed; the others may be absent, and the text tower is never used.
+# Groups of tensors. Only the network's are required. The text tower is never used.
 NETWORK, TEXT, DISCRIMINATOR, PRIORS, BODY, FLAG = "network", "text tower", "discriminator", "priors", "body", "flag"
 
 
@@ -56,8 +58,11 @@ class Expected:
 
 
 def config_from_shapes(shapes: Mapping[str, tuple[int, ...]]) -> dict:
-    """The official config with every size that a weight's shape tells. A weight that is missing or has too few axes
-    leaves the paper's size, so that the comparison with expected_tensors() names it."""
+    """Returns the official config, with the sizes replaced by those that the shapes of the weights give.
+
+    Where a weight is missing or has too few axes, the paper's size stays. The comparison with expected_tensors() then
+    reports that weight.
+    """
     config = dict(OFFICIAL_CONFIG)
     _take(config, "embed_dim", shapes, "backbone.pos_embed", 2)
     _take(config, "mlp_ratio", shapes, "backbone.blocks.0.mlp.fc1.weight", 0, config["embed_dim"])
@@ -72,7 +77,7 @@ def config_from_shapes(shapes: Mapping[str, tuple[int, ...]]) -> dict:
 
 
 def text_from_shapes(shapes: Mapping[str, tuple[int, ...]]) -> dict:
-    """The same for the sizes of CLIP's text tower."""
+    """Does the same for the size of CLIP's text tower."""
     text = dict(OFFICIAL_TEXT)
     _take(text, "width", shapes, CLIP + "token_embedding.weight", 1)
     _take(text, "vocabulary", shapes, CLIP + "token_embedding.weight", 0)
@@ -88,7 +93,8 @@ def _take(sizes: dict, key: str, shapes: Mapping[str, tuple[int, ...]], name: st
 
 
 def _count_blocks(names: Iterable[str], prefix: str) -> int:
-    """One more than the highest index after `prefix`; an index above the number of names is no block."""
+    """Returns the highest index after `prefix`, plus one. An index above the number of names is ignored: it cannot be
+    the index of a block."""
     names = list(names)
     pattern = re.compile(re.escape(prefix) + r"(\d{1,6})\.", re.ASCII)
     indices = [int(found[1]) for found in map(pattern.match, names) if found]
@@ -96,7 +102,7 @@ def _count_blocks(names: Iterable[str], prefix: str) -> int:
 
 
 def expected_tensors(config: Mapping, text: Mapping = OFFICIAL_TEXT) -> dict[str, Expected]:
-    """Every tensor of the official state dict for a network of these sizes, in the official order."""
+    """Returns every tensor of the official state dict for a network of this size, in the official order."""
     table: dict[str, Expected] = {"initialized": Expected((), FLAG, "BOOL")}
     table.update(_named(NETWORK, "backbone.", _backbone(config)))
     table.update(_named(NETWORK, "smal_head.", _head(config)))
@@ -129,7 +135,7 @@ def _norm(name: str, width: int):
 
 
 def _mlp(name: str, inputs: int, hidden: int, outputs: int, second: int = 2):
-    """Two linear layers of a torch Sequential; `second` is the index of the other one."""
+    """Two linear layers of a torch Sequential, at the indices 0 and `second`."""
     yield from _linear(f"{name}.0", inputs, hidden)
     yield from _linear(f"{name}.{second}", hidden, outputs)
 

@@ -1,13 +1,13 @@
-"""Reads a pickle as data: nothing that the file names is imported, called or executed.
+"""Reads a pickle as data. It imports, calls and executes nothing that the file names.
 
-A class or function that the file names becomes a `Global`, which is two strings. An object becomes a `Record`,
-which notes how the file would have made it: the class, the arguments, the state, the items. Whoever understands a
-class reads its record afterwards (pickled_arrays.py, torch_checkpoint.py); to everyone else it stays data.
+A class or function that the file names becomes a `Global`, which holds two strings. An object becomes a `Record`, which
+holds the class, the constructor's arguments, the state and the items that the file gives. Code that knows a class
+interprets its records afterwards (pickled_arrays.py, torch_checkpoint.py).
 
-That alone makes a hostile pickle harmless. It is refused all the same, by name, because a file that asks for
-`os.system` is not the file that its user believes to have: see pickle_names.py.
+This alone makes a hostile pickle harmless. A file that names something dangerous, such as `os.system`, is refused all
+the same, because it is not the file that its user believes it to be (see pickle_names.py).
 
-Time and memory are bounded by the file's size and by MAX_OPCODES.
+The size of the file and MAX_OPCODES bound the time and the memory that reading takes.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ MAX_INTEGER_BYTES = 256
 
 
 def load(data, where: str, persistent: Optional[Callable[[object], object]] = None):
-    """Reads one pickle of any protocol (0 to 5).
+    """Returns the object of one pickle, of any protocol (0 to 5).
 
-    data: bytes, or a view of bytes. where: names the file in messages. persistent: turns a persistent id into an
-    object, and raises RefusedPickle when it does not know it; without it such ids are refused.
+    data: bytes, or a memoryview. where: the file's name for messages. persistent: converts a persistent id into an
+    object, or raises RefusedPickle for an unknown id; without it, persistent ids are refused.
 
-    Dicts, lists, tuples, sets, numbers and text come back as themselves; a Python 2 string as text when it is
-    ASCII, else as bytes. Throws BrokenPickle and RefusedPickle, with the byte where it happened.
+    Dicts, lists, tuples, sets, numbers and text are returned as such. A Python 2 string is returned as text if it is
+    ASCII, otherwise as bytes. Throws BrokenPickle and RefusedPickle, whose message has the byte position.
     """
     machine = Machine(memoryview(data), persistent)
     try:
@@ -83,7 +83,7 @@ def _text_number(machine: Machine, text: str, kind: Callable):
     try:
         return kind(text)
     except ValueError:
-        raise BrokenPickle(f"{short(text)} in the place of a number") from None
+        raise BrokenPickle(f"{short(text)} where a number is expected") from None
 
 
 # --- opcodes: control ----------------------------------------------------------------------------------------------
@@ -140,7 +140,7 @@ _HANDLERS[b"F"[0]] = lambda machine: machine.push(_text_number(machine, machine.
 @_opcode(b"I")
 def _int(machine):
     text = machine.text_line()
-    truth = {"00": False, "01": True}.get(text)  # how protocols 0 and 1 write bools
+    truth = {"00": False, "01": True}.get(text)  # protocols 0 and 1 write bools in this way
     machine.push(_text_number(machine, text, int) if truth is None else truth)
 
 
@@ -154,7 +154,7 @@ for _code, _width in {b"\x8a": 1, b"\x8b": 4}.items():
         int.from_bytes(machine.take(_checked_integer(machine.unsigned(width))), "little", signed=True)
     )
 
-# Lengths are checked against what is left of the file before anything is copied.
+# take() compares a length with the rest of the file before anything is copied.
 for _code, _width, _kind in (
     (b"T", 4, _python2_string),
     (b"U", 1, _python2_string),
@@ -241,7 +241,7 @@ def _additems(machine):
     elif isinstance(target, set):
         target.update(map(checked_key, values))
     else:
-        raise RefusedPickle(f"adds to {short(target)}, which is no set")
+        raise RefusedPickle(f"adds to {short(target)}, which is not a set")
 
 
 # --- opcodes: the memo ---------------------------------------------------------------------------------------------
@@ -286,7 +286,7 @@ def _inst(machine):
 def _obj(machine):
     values = machine.pop_mark()
     if not values:
-        raise BrokenPickle("makes an object of no class")
+        raise BrokenPickle("creates an object without a class")
     machine.push(machine.call(values[0], tuple(values[1:])))
 
 
@@ -294,7 +294,7 @@ def _obj(machine):
 def _newobj(machine):
     args, cls = machine.pop(), machine.pop()
     if not isinstance(cls, Global) or not isinstance(args, tuple):
-        raise RefusedPickle(f"makes an object of {short(cls)}, which is no class")
+        raise RefusedPickle(f"creates an object of {short(cls)}, which is not a class")
     machine.push(Record(cls, args))
 
 
@@ -302,7 +302,7 @@ def _newobj(machine):
 def _newobj_ex(machine):
     keywords, args, cls = machine.pop(), machine.pop(), machine.pop()
     if not isinstance(cls, Global) or not isinstance(args, tuple) or not isinstance(keywords, dict):
-        raise RefusedPickle(f"makes an object of {short(cls)}, which is no class")
+        raise RefusedPickle(f"creates an object of {short(cls)}, which is not a class")
     machine.push(Record(cls, args + tuple(keywords.items())))
 
 
@@ -317,7 +317,7 @@ _HANDLERS[b"P"[0]] = lambda machine: machine.identify(machine.line())
 
 
 def _refused_extension(machine):
-    raise RefusedPickle("uses the extension registry (EXT), which means a class by number")
+    raise RefusedPickle("uses the extension registry (EXT), which names a class by a number")
 
 
 def _refused_buffer(machine):

@@ -1,6 +1,7 @@
-"""safetensors files: reading and writing tensor by tensor; writing under a temporary name.
+"""Reads and writes safetensors files one tensor at a time.
 
-Layout: 8 bytes little-endian length N, N bytes of JSON (name -> dtype, shape, data_offsets), the tensors' bytes.
+A file holds the length N of its header (8 bytes, little-endian), the header (N bytes of JSON: name -> dtype, shape,
+data_offsets), and the bytes of the tensors.
 """
 
 from __future__ import annotations
@@ -22,12 +23,12 @@ _NUMPY_NAMES = {"float64": "F64", "float32": "F32", "float16": "F16", "int64": "
 
 
 class TensorFileError(ValueError):
-    """A tensor file that cannot be read: what, where, got, expected."""
+    """A tensor file cannot be read. The message says what is wrong, where, what was found and what was expected."""
 
 
 @dataclass(frozen=True)
 class Tensor:
-    """A tensor whose bytes are produced when they are needed: little-endian, row-major, in chunks."""
+    """A tensor whose bytes are read only when they are needed: little-endian, row-major, in chunks."""
 
     dtype: str  # the format's name, a key of ITEM_BYTES
     shape: tuple[int, ...]
@@ -42,25 +43,29 @@ class Tensor:
 
 
 def from_array(values: np.ndarray) -> Tensor:
-    """Keeps a reference to the array; its numbers are written little-endian."""
+    """Returns a Tensor that refers to the array; the array must not change before it is written."""
     values = np.asarray(values, values.dtype.newbyteorder("<"), order="C")
     return Tensor(_NUMPY_NAMES[values.dtype.name], values.shape, lambda: [values.reshape(-1).view(np.uint8).data])
 
 
 def source_names(paths: Iterable[str]) -> str:
-    """The value of SOURCE_KEY."""
+    """Returns the value for SOURCE_KEY: the names of the files, without their folders."""
     return ", ".join(os.path.basename(path) for path in paths)
 
 
 def walk(view: memoryview) -> Iterator[memoryview]:
-    """The view in pieces of CHUNK_BYTES."""
+    """Yields the view in pieces of at most CHUNK_BYTES."""
     for start in range(0, len(view), CHUNK_BYTES):
         yield view[start : start + CHUNK_BYTES]
 
 
 def write(path: str, tensors: dict[str, Tensor], metadata: dict[str, str]) -> None:
-    """Writes beside `path`, syncs and renames, so that `path` is whole or not there. Wider types come first, which
-    aligns every tensor; otherwise the order is kept. The bytes depend on the arguments alone. Throws OSError."""
+    """Writes a file under a temporary name in the same folder, syncs it and renames it. `path` is then complete, or
+    after a failure unchanged.
+
+    Tensors of wider types come first, which aligns every tensor; otherwise the order is kept. The bytes of the file
+    depend only on the arguments. Throws OSError.
+    """
     order = sorted(tensors, key=lambda name: -ITEM_BYTES[tensors[name].dtype])
     header: dict[str, object] = {"__metadata__": metadata}
     offset = 0
@@ -95,8 +100,8 @@ def write(path: str, tensors: dict[str, Tensor], metadata: dict[str, str]) -> No
 
 
 def read(path: str) -> tuple[dict[str, Tensor], dict[str, str]]:
-    """The tensors, which read the file again when they are written, and the metadata. Throws TensorFileError and
-    OSError."""
+    """Returns the tensors and the metadata. The tensors read the file again when their bytes are needed. Throws
+    TensorFileError and OSError."""
     try:
         with open(path, "rb") as file:
             return _read(file)

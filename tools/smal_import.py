@@ -1,5 +1,7 @@
-"""The official SMAL pickles (Python 2, with chumpy and scipy objects) -> plain safetensors files: the body model as
-smal/tensors/asset.h describes it, and the shape and pose priors under their names in the official checkpoint.
+"""Converts the official SMAL pickles (Python 2, with chumpy and scipy objects) to plain safetensors files.
+
+The body model gets the form that smal/tensors/asset.h describes. The shape and pose priors get their names in the official
+checkpoint.
 """
 
 from __future__ import annotations
@@ -29,7 +31,8 @@ Say = Callable[[str], None]
 
 
 def import_body(source: str, target: str, say: Say) -> None:
-    """Throws BrokenPickle and RefusedPickle naming the file and the field."""
+    """Converts the body model. Throws BrokenPickle and RefusedPickle, whose messages name the file and the field, and
+    OSError."""
     table = _Table(source)
     shapedirs = table.numbers("shapedirs", (VERTICES, 3, None))
     if shapedirs.shape[2] < BETAS:
@@ -57,8 +60,11 @@ def import_body(source: str, target: str, say: Say) -> None:
 
 
 def import_priors(families_source: str, pose_source: str, target: str, say: Say) -> None:
-    """The official code keeps, of each family's covariance, a Cholesky factor of its regularised inverse, and of the
-    pose prior the factor that the file holds (`pic`)."""
+    """Converts the shape families and the pose prior. Throws as import_body() does.
+
+    As in the official code, each family is stored as a Cholesky factor of its regularised inverse covariance, and the
+    pose prior as the factor that its file holds (`pic`).
+    """
     families, pose = _Table(families_source), _Table(pose_source)
     means = families.numbers("cluster_means", (FAMILIES, BETAS))
     covariances = families.numbers("cluster_cov", (FAMILIES, BETAS, BETAS), np.float64)
@@ -70,7 +76,7 @@ def import_priors(families_source: str, pose_source: str, target: str, say: Say)
         "shape_prior_loss.mean_betas": means,
         "pose_prior_loss.mean_pose": mean_pose,
         "pose_prior_loss.precs": precision.astype(np.float32),
-        # The prior does not judge the global orientation, the first three numbers.
+        # The first three numbers are the global orientation, which the prior does not judge.
         "pose_prior_loss.use_index": np.array([0.0] * 3 + [1.0] * (3 * (JOINTS - 1)), np.float32),
     }
     _write(target, tensors, {"format": PRIORS_FORMAT, "name": "SMAL priors"}, [families_source, pose_source])
@@ -78,7 +84,7 @@ def import_priors(families_source: str, pose_source: str, target: str, say: Say)
 
 
 class _Table:
-    """The top-level dict of a pickle; every field is checked when it is taken."""
+    """The top-level dict of a pickle. Every field is checked when it is read."""
 
     def __init__(self, path: str):
         self.path = path
@@ -88,14 +94,14 @@ class _Table:
         with open(path, "rb") as file:
             data = file.read()
         if data.startswith(b"version https://git-lfs") or data.lstrip()[:1] == b"<":
-            raise BrokenPickle(f"{path}: a web page or a Git LFS pointer, not the file itself; download it again")
+            raise BrokenPickle(f"{path}: is a web page or a Git LFS pointer, not the file itself; download it again")
         root = restricted_pickle.load(data, path)
         self.fields = root.entries if isinstance(root, Record) else root
         if not isinstance(self.fields, dict):
             raise BrokenPickle(f"{path}: holds a {type(root).__name__}, expected a dict")
 
     def numbers(self, name: str, shape: Sequence, dtype=np.float32) -> np.ndarray:
-        """A field as finite numbers. None in `shape` stands for any size."""
+        """Returns a field as an array of finite numbers of the given shape, in which None accepts any size."""
         values = self._field(name)
         if values.dtype.kind not in "fiu":
             raise BrokenPickle(f"{self.path}: {name} has dtype {values.dtype}, expected numbers")
@@ -103,14 +109,14 @@ class _Table:
         if not matches:
             expected = ", ".join("any" if size is None else str(size) for size in shape)
             raise BrokenPickle(f"{self.path}: {name} has the shape {list(values.shape)}, expected [{expected}]")
-        with np.errstate(over="ignore"):  # becomes infinite, which is reported
+        with np.errstate(over="ignore"):  # an overflow gives infinity, which is reported below
             values = np.asarray(values, dtype, order="C")
         if not np.isfinite(values).all():
             raise BrokenPickle(f"{self.path}: {name} holds a number that is not finite in {values.dtype}")
         return values
 
     def indices(self, name: str, shape: Sequence, limit: int) -> np.ndarray:
-        values = self.numbers(name, shape, np.float64)  # exact for every index that is allowed
+        values = self.numbers(name, shape, np.float64)  # float64 represents every valid index exactly
         if values.min() < 0 or values.max() >= limit or (values % 1).any():
             found = f"{values.min():g} to {values.max():g}"
             raise BrokenPickle(f"{self.path}: {name} holds {found}, expected whole numbers from 0 to {limit - 1}")
@@ -127,7 +133,7 @@ class _Table:
 
 
 def _parents(table: _Table) -> np.ndarray:
-    """Row 0 of the kinematic table. The root's parent is -1, which unsigned 32-bit numbers show as 4294967295."""
+    """Returns row 0 of the kinematic table. The root's parent is -1, which is 4294967295 in unsigned 32-bit numbers."""
     parents = table.numbers("kintree_table", (2, JOINTS), np.float64)[0]
     parents = np.where(parents == 4294967295, -1, parents)
     before = [0 <= parent < joint and parent % 1 == 0 for joint, parent in enumerate(parents)]
@@ -148,21 +154,23 @@ def _check_rows_sum_to_one(what: str, rows: np.ndarray, tolerance: float = 1e-3)
 
 
 def _precision_factors(source: str, covariances: np.ndarray) -> np.ndarray:
-    """Lower Cholesky factors L with L L^T = (covariance + 1e-5 I)^-1, as in the official ShapePriorLoss."""
+    """Returns the lower Cholesky factors L with L L^T = (covariance + 1e-5 I)^-1, as in the official ShapePriorLoss."""
     try:
         return np.linalg.cholesky(np.linalg.inv(covariances + 1e-5 * np.eye(BETAS)))
     except np.linalg.LinAlgError as error:
-        raise BrokenPickle(f"{source}: cluster_cov holds a matrix that is no covariance ({error})") from None
+        raise BrokenPickle(f"{source}: cluster_cov holds a matrix that is not a covariance ({error})") from None
 
 
 def _check_pose_factor(pose: _Table, factor: np.ndarray, tolerance: float = 1e-6) -> None:
-    """Where the file also holds the covariance, the factor has to belong to it."""
+    """Checks that the factor belongs to the covariance, if the file holds the covariance."""
     if "cov" not in pose.fields:
         return
     covariance = pose.numbers("cov", factor.shape, np.float64)
     difference = np.abs(factor @ factor.T @ covariance - np.eye(len(factor))).max()
     if difference > tolerance:
-        raise BrokenPickle(f"{pose.path}: pic pic^T cov is {difference:.3g} off the identity: of another file?")
+        raise BrokenPickle(
+            f"{pose.path}: pic pic^T cov differs from the identity by {difference:.3g}, so pic does not belong to cov"
+        )
 
 
 def _keypoint_groups() -> list[list[int]]:

@@ -1,5 +1,7 @@
-"""Reads what torch.save wrote, without torch: a zip of stored (uncompressed) entries, of which data.pkl names the
-tensors and data/0, data/1, ... hold their numbers. Tensors are views of a memory map, read when they are written.
+"""Reads files that torch.save wrote, without using torch.
+
+Such a file is a zip archive of uncompressed entries: data.pkl names the tensors, and data/0, data/1, ... hold their
+numbers. The file is mapped into memory, and a tensor's bytes are read only when they are needed.
 """
 
 from __future__ import annotations
@@ -34,22 +36,23 @@ _STORAGE_DTYPES = {
     "ByteStorage": "U8",
     "BoolStorage": "BOOL",
 }
-_LEGACY_MAGIC = b"\x80\x02\x8a\x0al\xfc\x9cF\xf9 j\xa8P\x19"  # torch before 1.6, and its old format since
+# The format of torch before 1.6, which newer versions can still write.
+_LEGACY_MAGIC = b"\x80\x02\x8a\x0al\xfc\x9cF\xf9 j\xa8P\x19"
 _LOCAL_HEADER_BYTES = 30
 _ENCRYPTED = 0x1
 
 
 @dataclass(frozen=True)
 class _Storage:
-    kind: str  # a key of _STORAGE_DTYPES, if it is to be read
+    kind: str  # a key of _STORAGE_DTYPES if the type is supported
     key: str
-    count: int  # of numbers
+    count: int  # how many numbers it holds
 
 
 class TorchFile:
-    """One checkpoint. `root` is its pickled object: dicts, lists, numbers and records (restricted_pickle.py).
+    """A checkpoint. `root` is its pickled object: dicts, lists, numbers and records (restricted_pickle.py).
 
-    Throws TensorFileError, BrokenPickle, RefusedPickle and OSError, naming the file.
+    Its functions throw TensorFileError, BrokenPickle, RefusedPickle and OSError; the messages name the file.
     """
 
     def __init__(self, path: str, check_sums: bool = True):
@@ -77,7 +80,7 @@ class TorchFile:
         self.root = restricted_pickle.load(self._data_of(entry), f"{path}: data.pkl", self._storage)
 
     def tensors(self, table, what: str) -> dict[str, Tensor]:
-        """The tensors of a state dict. Throws TensorFileError when a value is no tensor."""
+        """Returns the tensors of a state dict by name. Throws TensorFileError when a value is not a tensor."""
         entries = table.entries if isinstance(table, Record) else table
         if not isinstance(entries, dict):
             raise TensorFileError(f"{self.path}: {what} is a {_kind(table)}, expected a table of tensors")
@@ -91,12 +94,12 @@ class TorchFile:
                 raise TensorFileError(f"{self.path}: {what}: {name[:200]}: {error}") from None
         return tensors
 
-    # The zip.
+    # --- the zip archive ---
 
     def _list_entries(self, file) -> dict[str, zipfile.ZipInfo]:
         if self._start.startswith(_LEGACY_MAGIC):
             raise TensorFileError(
-                f"{self.path}: saved in torch's old format (before 1.6), which is one pickle after another; save it "
+                f"{self.path}: saved in torch's old format (before 1.6), which is not supported; save it "
                 "again with a newer torch: torch.save(torch.load(IN, weights_only=True), OUT)"
             )
         try:
@@ -119,11 +122,12 @@ class TorchFile:
         return self._bytes[start:end]
 
     def _span(self, info: zipfile.ZipInfo) -> tuple[int, int]:
-        """Where a stored entry's bytes lie. Its local header repeats the name, with a length of its own."""
+        """Returns where the bytes of an entry begin and end. The entry's local header gives the lengths of the fields
+        in front of the data, which may differ from those in the directory."""
         where = f"{self.path}: zip entry {info.filename[:200]!r}"
         stored = info.compress_type == zipfile.ZIP_STORED and info.compress_size == info.file_size
         if not stored or info.flag_bits & _ENCRYPTED:
-            raise TensorFileError(f"{where}: compressed or encrypted; torch stores its entries as they are")
+            raise TensorFileError(f"{where}: compressed or encrypted; torch.save writes neither")
         header = self._bytes[info.header_offset : info.header_offset + _LOCAL_HEADER_BYTES]
         if len(header) < _LOCAL_HEADER_BYTES or bytes(header[:4]) != b"PK\x03\x04":
             raise TensorFileError(f"{where}: its local header is not where the directory says (truncated?)")
@@ -140,8 +144,8 @@ class TorchFile:
                 pass
 
     def _checked_chunks(self, name: str) -> Iterator[memoryview]:
-        """All bytes of an entry. At the end compares their CRC-32 with the zip's and forgets the pages, so that the
-        mapping does not count as memory."""
+        """Yields all bytes of an entry. At the end it compares their CRC-32 with the one in the zip, and releases the
+        pages of the mapping, so that they do not count as used memory."""
         info = self._entries[name]
         start, end = self._span(info)
         crc = 0
@@ -159,10 +163,10 @@ class TorchFile:
         if end - first >= mmap.PAGESIZE and hasattr(self._map, "madvise"):
             self._map.madvise(mmap.MADV_DONTNEED, first, (end - first) // mmap.PAGESIZE * mmap.PAGESIZE)
 
-    # The tensors.
+    # --- the tensors ---
 
     def _storage(self, identity) -> _Storage:
-        """A persistent id of torch: ('storage', class, key, device, count of numbers)."""
+        """Converts a persistent id of torch: ('storage', class, key, device, count of numbers)."""
         well_formed = (
             isinstance(identity, tuple)
             and len(identity) == 5
@@ -178,7 +182,7 @@ class TorchFile:
             raise RefusedPickle("a persistent id that is not torch's ('storage', class, key, device, size)")
         _, cls, key, _, count = identity
         if cls.module not in ("torch", "torch.storage") or not cls.name.endswith("Storage"):
-            raise RefusedPickle(f"a storage of class {cls.path}, which is none of torch's")
+            raise RefusedPickle(f"a storage of class {cls.path}, which is not one of torch's")
         return _Storage(cls.name, key, count)
 
     def _tensor(self, value) -> Tensor:
@@ -223,7 +227,7 @@ class TorchFile:
         return Tensor(dtype, shape, lambda: self._gathered(name, numbers[offset:], shape, strides))
 
     def _gathered(self, name: str, numbers: np.ndarray, shape, strides) -> Iterator:
-        """A part of a storage, or one in another order. The bounds were checked."""
+        """Yields the bytes of a tensor that is a part of a storage or has another order. _view() checked the bounds."""
         self._check_sum(name)
         if math.prod(shape) == 0:
             return
@@ -251,7 +255,7 @@ def _kind(value) -> str:
 
 
 def _impostor(start: bytes) -> str:
-    """What a download that went wrong usually is."""
+    """Recognises the usual results of a download that went wrong; '' when it is none of them."""
     if start.startswith(b"version https://git-lfs"):
         return "a Git LFS pointer, not the file itself; fetch it with `git lfs pull` or by its download link"
     if start.lstrip()[:1] == b"<":

@@ -1,4 +1,4 @@
-"""`make assets` against a hub on this machine."""
+"""Tests `make assets` against a hub that runs on this machine."""
 
 import dataclasses
 import hashlib
@@ -25,7 +25,7 @@ POSE = "walking_toy_symmetric_pose_prior_with_cov_35parts.pkl"
 
 
 class Hub(http.server.ThreadingHTTPServer):
-    """Serves `files` ({path: bytes or status}) and counts what is asked for."""
+    """Serves `files` ({path: content or HTTP status}) and records the requested paths in `asked`."""
 
     def __init__(self):
         super().__init__(("127.0.0.1", 0), _Handler)
@@ -35,7 +35,7 @@ class Hub(http.server.ThreadingHTTPServer):
         threading.Thread(target=self.serve_forever, daemon=True).start()
 
     def publish(self, repository, name, content, digest=None):
-        """A large file: the repository holds a pointer, as on the real hub."""
+        """Publishes a large file. As on the real hub, the repository holds a pointer to it."""
         digest = digest or hashlib.sha256(content).hexdigest()
         pointer = f"version https://git-lfs.github.com/spec/v1\noid sha256:{digest}\nsize {len(content)}\n"
         self.files[f"{repository}raw/main/{name}"] = pointer.encode()
@@ -66,7 +66,7 @@ class HubCase(unittest.TestCase):
         self.addCleanup(self.hub.server_close)
         self.addCleanup(self.hub.shutdown)
         self.replace(fetch_assets, "HUB", f"http://127.0.0.1:{self.hub.server_port}")
-        # The importers have tests of their own.
+        # The importers have their own tests; here they only record how they were called.
         self.imported = []
         for module, name in (
             (prima_import, "import_checkpoint"),
@@ -114,8 +114,8 @@ class FetchTest(HubCase):
         )
         self.assertEqual((self.official / BODY).read_bytes(), BODY.encode() * 1000)
         self.assertEqual(out.count(", as published"), 4)
-        self.assertIn("open_clip_config.json: SHA-256 44136fa355b3678a", out)  # sha256sum of {}
-        self.assertIn("no published digest is known: recorded in", out)
+        self.assertIn("open_clip_config.json: SHA-256 44136fa355b3678a", out)  # the SHA-256 of "{}"
+        self.assertIn("at this first use, since no published digest is known", out)
         check = subprocess.run(["sha256sum", "-c", "sha256.lock"], cwd=self.official, capture_output=True, text=True)
         self.assertEqual((check.returncode, check.stdout.count(": OK")), (0, 5))
         self.assertEqual([name for name in os.listdir(self.official) if name.endswith(".part")], [])
@@ -146,7 +146,7 @@ class FetchTest(HubCase):
         self.hub.publish(PRIMA, BODY, b"replaced", digest="0" * 64)
         code, _, err = self.fetch()
         self.assertEqual(code, 1)
-        self.assertIn(f"{BODY}: SHA-256 {hashlib.sha256(b'replaced').hexdigest()}, but its publisher says 0000", err)
+        self.assertIn(f"{BODY}: SHA-256 {hashlib.sha256(b'replaced').hexdigest()}, but its publisher states 0000", err)
         self.assertEqual(sorted(os.listdir(self.official)), ["s1ckpt_inference.ckpt", "sha256.lock"])
 
     def test_a_file_that_changed_since_its_first_use(self):
@@ -169,7 +169,7 @@ class FetchTest(HubCase):
             (self.official / name).write_bytes(b"placed by hand")
         code, out, _ = self.fetch("--offline")
         self.assertEqual((code, len(self.imported), self.hub.asked), (0, 3, []))
-        self.assertEqual(out.count("no published digest is known: recorded in"), 4)
+        self.assertEqual(out.count("at this first use, since no published digest is known"), 4)
         self.assertEqual(self.imported[0][2], {"open_clip_config": None})
 
     def test_connections_that_break_leave_no_file(self):

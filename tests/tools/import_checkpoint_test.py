@@ -1,6 +1,6 @@
-"""The Lightning checkpoint, BioCLIP and AniMer's backbone, in the official form at tiny sizes.
+"""Tests the import of the Lightning checkpoint, BioCLIP and AniMer's backbone, on tiny files of the official form.
 
-The network's tensors are those that the official code made (tests/data/parity/weights_A), under its names.
+The official code created the network's tensors and their names (tests/data/parity/weights_A).
 """
 
 import enum
@@ -38,7 +38,7 @@ def network():
 
 
 def extras():
-    """What the official state dict holds besides the network."""
+    """Returns random tensors for everything that the official state dict holds besides the network."""
     expected = prima_names.expected_tensors(prima_names.OFFICIAL_CONFIG | TINY, TEXT)
     generator = torch.Generator().manual_seed(5)
     types = {"F32": torch.float32, "I32": torch.int32, "BOOL": torch.bool}
@@ -50,7 +50,7 @@ def extras():
 
 
 def lightning(state_dict, hyper_parameters=None):
-    """What Lightning's trainer writes beside the weights."""
+    """Returns a checkpoint with the entries that Lightning's trainer writes besides the weights."""
     parameter = next(iter(state_dict.values()))
     return {
         "epoch": 3,
@@ -258,7 +258,8 @@ class FaultTest(CheckpointCase):
             "backbone.blocks.7x.norm1.weight: extra",
             "backbone.blocks.0.norm1.bias: missing, expected F32 [64]",
             CLIP + "visual.proj: missing",
-            "bioclip_embedding.projection.0.weight: shape [64, 32], expected [64, 512]",  # as visual.proj is missing
+            # 512 is the default, since visual.proj is missing.
+            "bioclip_embedding.projection.0.weight: shape [64, 32], expected [64, 512]",
             CLIP + "text_projection: shape [8, 32], expected [8, 512]",
             "discriminator.bone_out.bias: missing",
             "--drop PREFIX",
@@ -376,7 +377,7 @@ class MergeTest(CheckpointCase):
         torch.save(self.part(CLIP + "visual.", CLIP), self.source)
         for changes, mention in (
             ({"quick_gelu": "TRUE"}, "quick_gelu is 'TRUE', expected true or false"),
-            ({"embed_dim": 768}, "clip_out is 768 there, but 32 in the weights"),
+            ({"embed_dim": 768}, "clip_out is 768, but 32 in the weights"),
             ({"vision_cfg": {}}, "not an open_clip_config.json"),
         ):
             self.write_config(**changes)

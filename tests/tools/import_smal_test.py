@@ -1,4 +1,4 @@
-"""The SMAL body and priors, in the form of the official Python 2 pickles."""
+"""Tests the import of the SMAL body and priors, on files in the form of the official Python 2 pickles."""
 
 import json
 import os
@@ -10,7 +10,7 @@ import numpy as np
 import support  # first of ours: it sets the path
 
 VERTICES, FACES, JOINTS, BETAS = 3889, 7774, 35, 41
-REAL_FILES = os.environ.get("Q3D_SMAL_FOLDER")  # with the two released pickles of the priors
+REAL_FILES = os.environ.get("Q3D_SMAL_FOLDER")  # the folder that holds the two released pickles of the priors
 
 
 class AssetCase(unittest.TestCase):
@@ -45,7 +45,7 @@ class BodyTest(AssetCase):
             "J_regressor": regressor,
             "kintree_table": np.stack([parents, np.arange(JOINTS, dtype=np.uint32)]),
         }
-        rows, columns = np.nonzero(regressor.T)[::-1]  # by column, as csc stores them
+        rows, columns = np.nonzero(regressor.T)[::-1]  # ordered by column, as csc stores them
         cls.sparse = {
             "data": regressor[rows, columns],
             "indices": rows.astype(np.int32),
@@ -54,7 +54,7 @@ class BodyTest(AssetCase):
         }
 
     def save(self, **changes):
-        """A model file: chumpy arrays, a scipy matrix, and a few fields that nobody reads."""
+        """Writes a model file with chumpy arrays, a scipy matrix, and a few fields that the importer ignores."""
         with support.foreign_classes(("chumpy.ch.Ch", object), ("scipy.sparse.csc.csc_matrix", object)) as made:
 
             def chumpy(values):
@@ -113,7 +113,7 @@ class BodyTest(AssetCase):
         signed = self.numbers["kintree_table"].astype(np.int64)
         signed[0, 0] = -1
         for changes in (
-            {"shapedirs": more},  # the first 41 directions count
+            {"shapedirs": more},  # only the first 41 directions are used
             {"J_regressor": self.numbers["J_regressor"]},
             {"kintree_table": signed},
             {"f": self.numbers["f"].astype(np.int64), "weights": self.numbers["weights"]},
@@ -180,7 +180,7 @@ class PriorsTest(AssetCase):
             prior = {"mean_pose": self.mean_pose, "pic": factor, "cov": self.pose_covariance}
             paths = self.folder / "families.pkl", self.folder / "pose.pkl"
             for path, table in zip(paths, (shape | families, prior | pose)):
-                path.write_bytes(support.python2_pickle(table, 0))  # the released files are in protocol 0
+                path.write_bytes(support.python2_pickle(table, 0))  # the protocol of the released files
         return support.run("priors", *paths, self.target)
 
     def test_every_table(self):
@@ -203,10 +203,10 @@ class PriorsTest(AssetCase):
         negative = list(self.covariances)
         negative[2] = -negative[2]
         for arguments, mention in (
-            (({"cluster_cov": negative},), "families.pkl: cluster_cov holds a matrix that is no covariance"),
+            (({"cluster_cov": negative},), "families.pkl: cluster_cov holds a matrix that is not a covariance"),
             (({"cluster_means": self.means[:4]},), "families.pkl: cluster_means has the shape [4, 41], expected [5"),
             (({}, {"pic": self.factor[:30, :30]}), "pose.pkl: pic has the shape [30, 30], expected [105, 105]"),
-            (({}, {"cov": 2 * self.pose_covariance}), "pose.pkl: pic pic^T cov is"),
+            (({}, {"cov": 2 * self.pose_covariance}), "pose.pkl: pic pic^T cov differs from the identity"),
             (({}, {"mean_pose": None}), "pose.pkl: mean_pose is a NoneType"),
         ):
             with self.subTest(mention=mention):

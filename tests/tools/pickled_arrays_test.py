@@ -1,4 +1,4 @@
-"""numpy, chumpy and scipy objects in pickles, against numpy's own reading of them."""
+"""Compares how numpy, chumpy and scipy objects are read from pickles with the arrays that were pickled."""
 
 import pickle
 import unittest
@@ -28,7 +28,7 @@ def read(data):
 
 
 def sparse_pickle(kind, state, protocol=2):
-    """A scipy matrix as it was pickled, in the module where scipy of its time had it."""
+    """Pickles a scipy matrix under the module name that old versions of scipy used."""
     with support.foreign_classes((f"scipy.sparse.{kind}.{kind}_matrix", object)) as made:
         value = getattr(made, f"{kind}_matrix")()
         value.__dict__.update(state)
@@ -57,7 +57,7 @@ class NumpyTest(unittest.TestCase):
         np.testing.assert_array_equal(array(stacked, "x"), value[1])
         self.assertEqual(array(number, "x"), 1.5)
 
-    def test_what_is_no_array(self):
+    def test_values_that_are_not_arrays(self):
         objects = np.array([None, {}], dtype=object)
         for value, message in (
             (objects, "dtype 'O8'"),
@@ -65,15 +65,15 @@ class NumpyTest(unittest.TestCase):
             (np.zeros(2, dtype=[("a", "f4")]), "dtype 'V4'"),
             ("text", "is a str"),
             (None, "is a NoneType"),
-            ([np.eye(2), np.eye(3)], "no rectangular table"),
-            ([2**70], "no rectangular table"),
+            ([np.eye(2), np.eye(3)], "not a rectangular table"),
+            ([2**70], "not a rectangular table"),
             ({1, 2}, "is a set"),
             (np.random.default_rng, "is a Global"),
         ):
             with self.subTest(message=message), self.assertRaisesRegex(BrokenPickle, f"field.*{message}"):
                 array(read(pickle.dumps(value, 4)), "field")
 
-    def test_shapes_that_lie(self):
+    def test_shapes_that_do_not_match_the_data(self):
         data = pickle.dumps(np.arange(6.0), 2)
         self.assertIn(b"K\x06\x85", data)
         for lie in (b"K\x05\x85", b"J\xff\xff\xff\x7f\x85", b"J\xff\xff\xff\xff\x85"):
@@ -103,7 +103,7 @@ class ChumpyTest(unittest.TestCase):
 
 
 class ScipyTest(unittest.TestCase):
-    # [[0, 1, 0], [2, 0, 3]] in the three layouts, written down by hand.
+    # The matrix [[0, 1, 0], [2, 0, 3]] in the three layouts, written by hand.
     DENSE = np.array([[0.0, 1.0, 0.0], [2.0, 0.0, 3.0]])
     CSC = {"data": np.array([2.0, 1.0, 3.0]), "indices": np.array([1, 0, 1]), "indptr": np.array([0, 1, 2, 3])}
     CSR = {"data": np.array([1.0, 2.0, 3.0]), "indices": np.array([1, 0, 2]), "indptr": np.array([0, 1, 3])}

@@ -1,4 +1,4 @@
-"""The unpickler that executes nothing."""
+"""Tests that the unpickler reads data correctly and executes nothing."""
 
 import collections
 import datetime
@@ -23,7 +23,7 @@ class Colour(enum.Enum):
 
 
 class Plain:
-    """Its methods would betray that someone called them."""
+    """Its state shows whether __init__ was called, and __setstate__ fails when it is called."""
 
     def __init__(self):
         self.value = [1, 2]
@@ -37,7 +37,7 @@ def read(data):
 
 
 def call(module, name, *args):
-    """A protocol-2 pickle that calls module.name(*args)."""
+    """Returns a protocol-2 pickle that calls module.name(*args)."""
     body = b"c" + module.encode() + b"\n" + name.encode() + b"\n("
     for arg in args:
         body += b"X" + struct.pack("<I", len(arg)) + arg.encode()
@@ -60,7 +60,7 @@ class PlainDataTest(unittest.TestCase):
     def test_agrees_with_pickle_in_every_protocol(self):
         for protocol in range(2, 6):
             value = dict(self.VALUE)
-            if protocol < 4:  # older protocols write bytes and sets as calls
+            if protocol < 4:  # older protocols pickle bytes and sets as calls
                 del value["bytes"], value["sets"]
             with self.subTest(protocol=protocol):
                 self.assertEqual(read(pickle.dumps(value, protocol)), value)
@@ -125,7 +125,7 @@ class ForeignObjectTest(unittest.TestCase):
 
 
 class HostileTest(unittest.TestCase):
-    """Each trick is refused, is named, and has no effect."""
+    """Every attack is refused with a message that names it, and has no effect."""
 
     def assert_refused(self, data, *mentions, error=RefusedPickle):
         with self.assertRaises(error) as caught:
@@ -147,7 +147,7 @@ class HostileTest(unittest.TestCase):
 
         for protocol in range(6):
             self.assert_refused(pickle.dumps(Attack(), protocol), "posix.system")
-            self.assert_refused(pickle.dumps([1, {"x": Spawn()}], protocol), ".Popen")  # commands.Popen in Python 2
+            self.assert_refused(pickle.dumps([1, {"x": Spawn()}], protocol), ".Popen")  # Python 2: commands.Popen
         self.assertFalse(os.path.exists(canary))
 
     def test_functions(self):
@@ -177,10 +177,10 @@ class HostileTest(unittest.TestCase):
         self.assert_refused(b"(cos\nsystem\nS'ls'\no.", "os.system")  # OBJ
         self.assert_refused(b"\x80\x04\x8c\x02os\x8c\x06system\x93)R.", "os.system")  # STACK_GLOBAL
         self.assert_refused(b"\x80\x02cos\nsystem\n)\x81.", "os.system")  # NEWOBJ
-        self.assert_refused(b"cos\nsystem\n.", "os.system")  # named and never called
+        self.assert_refused(b"cos\nsystem\n.", "os.system")  # named, but never called
         self.assert_refused(b"\x80\x04\x8c\x03lab\x8c\x15Net.__init__.__module\x93.", "Net.__init__")
-        self.assert_refused(b"\x80\x04K\x01K\x02\x93.", "no Python name")
-        self.assert_refused(b"clab; import os\nNet\n.", "no Python name")
+        self.assert_refused(b"\x80\x04K\x01K\x02\x93.", "not a Python name")
+        self.assert_refused(b"clab; import os\nNet\n.", "not a Python name")
 
     def test_getattr_serves_enums_alone(self):
         self.assertEqual(read(b"cbuiltins\ngetattr\n(clab\nKind\nS'ONE'\ntR.").args, ("ONE",))
@@ -190,13 +190,13 @@ class HostileTest(unittest.TestCase):
     def test_calls_of_results(self):
         self.assert_refused(b"clab\nMaker\n)R)R.", "calls lab.Maker")
         self.assert_refused(b"S'eval'\n)R.", "calls 'eval'")
-        self.assert_refused(b"clab\nMaker\n]R.", "in the place of arguments")
-        self.assert_refused(b"\x80\x02])\x81.", "a list, which is no class")
-        self.assert_refused(b"\x80\x04clab\nNet\n)]\x92.", "lab.Net, which is no class")
+        self.assert_refused(b"clab\nMaker\n]R.", "as its arguments")
+        self.assert_refused(b"\x80\x02])\x81.", "a list, which is not a class")
+        self.assert_refused(b"\x80\x04clab\nNet\n)]\x92.", "lab.Net, which is not a class")
 
     def test_states(self):
         self.assert_refused(b"(l}b.", "sets the state of a list")
-        self.assert_refused(b"clab\nNet\n}b.", "sets the state of lab.Net")  # a class's own attributes
+        self.assert_refused(b"clab\nNet\n}b.", "sets the state of lab.Net")  # this would set attributes of the class
         self.assert_refused(b"\x80\x02clab\nNet\n)\x81}b}b.", "twice")
         self.assert_refused(b"NS'a'\nK\x01s.", "sets items of a NoneType")
         self.assert_refused(b"\x80\x02}K\x01a.", "appends to a dict")
@@ -213,7 +213,7 @@ class HostileTest(unittest.TestCase):
         bombs = {
             "an integer of 2147483647 bytes": b"\x80\x02\x8b\xff\xff\xff\x7f" + b"\x01" * 1000 + b".",
             "an integer of": b"L" + b"9" * 5000 + b"L\n.",
-            "as the key": b"(" + b"K\x01" + b"\x85" * 200_000 + b"K\x01d.",  # hashing nested tuples overflows the stack
+            "as the key": b"(" + b"K\x01" + b"\x85" * 200_000 + b"K\x01d.",  # hashing it overflows the C stack
         }
         for mention, data in bombs.items():
             with self.subTest(mention=mention):
@@ -227,11 +227,11 @@ class HostileTest(unittest.TestCase):
     def test_deep_and_wide_objects_are_harmless(self):
         deep = b"]" * 200_000 + b"a" * 199_999 + b"."
         self.assertEqual(len(read(deep)), 1)
-        # Every list holds the one before twice: 2^60 objects for whoever walks them, 60 in memory.
+        # Every list holds the previous one twice: there are 60 lists in memory, but a walk over them visits 2^60.
         layers = [b"]q" + bytes([i]) + b"(" + 2 * (b"h" + bytes([i - 1])) + b"e" for i in range(1, 61)]
         self.assertEqual(len(read(b"(]q\x00" + b"".join(layers) + b"t.")), 61)
 
-    def test_lengths_beyond_the_file(self):
+    def test_lengths_beyond_the_end_of_the_file(self):
         longest = b"\xff\xff\xff\xff"
         for code in (b"T" + longest, b"B" + longest, b"X" + longest, b"\x8e" + 2 * longest, b"\x95" + 2 * longest):
             self.assert_refused(b"\x80\x04" + code + b"abc.", "ends early", error=BrokenPickle)
@@ -275,7 +275,7 @@ class BrokenTest(unittest.TestCase):
             (b"K\x01p-3\n.", "number -3"),
             (b"\xfe.", "unknown opcode 0xfe"),
             (b"\x80\x09.", "protocol 9"),
-            (b"Ix1\n.", "in the place of a number"),
+            (b"Ix1\n.", "where a number is expected"),
             (b"S'abc\n.", "without quotes"),
             (b"X\x02\x00\x00\x00\xff\xff.", "not utf-8"),
         ):

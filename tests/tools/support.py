@@ -1,5 +1,5 @@
-"""What the tests share: the command line, a reader of safetensors that is not the project's, pickles as Python 2 wrote
-them, and classes of packages that are not installed."""
+"""Functions that the tests share: the command line, an independent reader of safetensors, a writer of Python 2 pickles,
+and classes of packages that are not installed."""
 
 import contextlib
 import io
@@ -24,7 +24,7 @@ NUMPY_TYPES |= {"I8": "<i1", "U8": "<u1", "BOOL": "?"}
 
 
 def run(*arguments):
-    """(exit code, standard output, standard error) of import_assets.py."""
+    """Runs import_assets.py. Returns its exit code, standard output and standard error."""
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         try:
@@ -35,7 +35,7 @@ def run(*arguments):
 
 
 def read_safetensors(path):
-    """({name: array}, metadata). bfloat16 comes as its bits."""
+    """Returns {name: array} and the metadata. A bfloat16 tensor is returned as its bits."""
     with open(path, "rb") as file:
         raw = file.read()
     (length,) = struct.unpack("<Q", raw[:8])
@@ -51,7 +51,7 @@ def read_safetensors(path):
 
 @contextlib.contextmanager
 def foreign_classes(*paths):
-    """Makes classes such as "yacs.config.CfgNode" importable, and gone afterwards. Values are bases."""
+    """Makes classes importable inside a `with` block. A class is given as ("yacs.config.CfgNode", dict): path, base."""
     made, before = {}, dict(sys.modules)
     try:
         for path, base in paths:
@@ -69,7 +69,7 @@ def foreign_classes(*paths):
 
 
 class _Python2Pickler(pickle._Pickler):
-    """Text and bytes as the one string type of Python 2."""
+    """Writes text and bytes as Python 2 does, which has one type for both."""
 
     dispatch = dict(pickle._Pickler.dispatch)
 
@@ -88,7 +88,7 @@ class _Python2Pickler(pickle._Pickler):
 
 
 def python2_pickle(value, protocol=2):
-    """`value` as Python 2's cPickle would have written it, with numpy 1's module names."""
+    """Pickles `value` as Python 2's cPickle does, with the module names of numpy 1."""
     buffer = io.BytesIO()
     _Python2Pickler(buffer, protocol=protocol, fix_imports=True).dump(value)
     return buffer.getvalue().replace(b"numpy._core.", b"numpy.core.")

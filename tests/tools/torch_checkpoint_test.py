@@ -1,4 +1,4 @@
-"""Files of torch.save, read without torch and compared with torch's tensors."""
+"""Reads files of torch.save without torch, and compares them with torch's own tensors."""
 
 import io
 import os
@@ -17,7 +17,7 @@ from torch_checkpoint import TorchFile
 
 
 def numbers(tensor):
-    """The bytes of one of the project's tensors."""
+    """Returns the bytes of a safetensors_file.Tensor."""
     return b"".join(bytes(chunk) for chunk in tensor.chunks())
 
 
@@ -68,7 +68,7 @@ class ReadingTest(TorchFileCase):
             "tied": base,
             "again": base,
             "parameter": torch.nn.Parameter(torch.randn(4)),
-            "large": torch.randn(3000, 1000).t(),  # gathered in several chunks
+            "large": torch.randn(3000, 1000).t(),  # is written in several chunks
         }
         file = TorchFile(self.save(tensors))
         read = file.tensors(file.root, "root")
@@ -86,7 +86,7 @@ class ReadingTest(TorchFileCase):
         self.assertGreater(len(chunks), 1)
         self.assertEqual(sum(map(len, chunks)), 20 << 20)
 
-    def test_what_is_no_tensor(self):
+    def test_values_that_are_not_tensors(self):
         file = TorchFile(self.save({"a": torch.ones(1), "b": [1]}))
         with self.assertRaisesRegex(TensorFileError, "file.ckpt: root: b: a list, expected a tensor"):
             file.tensors(file.root, "root")
@@ -130,7 +130,7 @@ class DamageTest(TorchFileCase):
             file.write(data)
         self.assert_broken("data.pkl': CRC-32")
 
-    def test_zips_of_another_making(self):
+    def test_zips_that_torch_did_not_write(self):
         self.save({"w": torch.randn(40)})
         entries = self.entries()
         self.rewrite(entries, zipfile.ZIP_DEFLATED)
@@ -168,7 +168,8 @@ class DamageTest(TorchFileCase):
 
 class HostileTest(TorchFileCase):
     def refuse(self, root, *mentions, error=RefusedPickle, persistent_id=None):
-        """Puts a pickle of `root` into a file of torch's form; every _Id in it becomes a persistent id."""
+        """Writes a checkpoint with a pickle of `root`, in which every _Id is a persistent id. Checks that reading it
+        fails with these mentions."""
         self.save({"w": torch.zeros(4)})
         buffer = io.BytesIO()
         pickler = pickle._Pickler(buffer, 2)
