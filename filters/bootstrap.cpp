@@ -27,7 +27,7 @@ void check(std::span<const double> values, std::span<const std::size_t> picture_
   }
 }
 
-// How many pictures the items belong to.
+// Returns the number of pictures that the items belong to.
 std::size_t count_pictures(std::span<const std::size_t> picture_of_item) {
   std::vector<bool> occurs(picture_of_item.size(), false);
   for (const std::size_t picture : picture_of_item) {
@@ -40,10 +40,10 @@ std::size_t count_pictures(std::span<const std::size_t> picture_of_item) {
   return pictures;
 }
 
-// Values of one method: all that a resample's mean depends on.
+// The values of one method, in the form that a resample's mean needs.
 class PictureSums {
  public:
-  // NaN is no member.
+  // An item with NaN is not a member of the set.
   PictureSums(std::span<const double> values, std::span<const std::size_t> picture_of_item)
       : pictures_(count_pictures(picture_of_item)), runs_(values.size() / picture_of_item.size()) {
     sums_.assign(pictures_ * runs_, 0.0);
@@ -63,7 +63,8 @@ class PictureSums {
   std::size_t pictures() const { return pictures_; }
   std::size_t runs() const { return runs_; }
 
-  // The mean of the members of drawn pictures, each as often as its run was drawn; NaN without members.
+  // Returns the mean of the members of the drawn pictures. Each member counts as often as its picture and its
+  // run were drawn. NaN if there are no members.
   double mean(const std::vector<std::size_t>& drawn_pictures, const std::vector<double>& times_drawn) const {
     double sum = 0.0;
     double count = 0.0;
@@ -83,8 +84,8 @@ class PictureSums {
   std::vector<double> counts_;  // pictures x runs
 };
 
-// 0 .. count - 1, the same on every machine (the standard's distributions are not). The bias is below
-// count / 2^53.
+// Draws a number from 0 to count - 1. The result is the same on every machine, unlike that of the standard's
+// distributions. The bias is below count / 2^53.
 std::size_t draw(std::mt19937_64& random, std::size_t count) {
   return static_cast<std::size_t>(static_cast<double>(random() >> 11) * 0x1p-53 * static_cast<double>(count));
 }

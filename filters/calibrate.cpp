@@ -26,7 +26,7 @@ void check_input(std::span<const CalibrationSample> pool, const TargetShares& sh
   }
 }
 
-// A threshold that exactly the first `cut` of the ascending errors lie below.
+// Returns a threshold above exactly the first `cut` of the ascending errors.
 double threshold_at(const std::vector<CalibrationSample>& sorted, std::size_t cut) {
   if (cut == sorted.size()) {
     return std::nextafter(sorted.back().initial_error, std::numeric_limits<double>::infinity());
@@ -38,7 +38,8 @@ double threshold_at(const std::vector<CalibrationSample>& sorted, std::size_t cu
   return middle > below ? middle : above;
 }
 
-// Cuts from `first` on that a positive threshold can make: not between equal errors, nor below an error of 0.
+// Returns the cuts from `first` on that a positive threshold can make: not between equal errors, and not
+// below an error of 0.
 std::vector<std::size_t> possible_cuts(const std::vector<CalibrationSample>& sorted, std::size_t first) {
   std::vector<std::size_t> cuts;
   for (std::size_t cut = first; cut <= sorted.size(); ++cut) {
@@ -63,7 +64,7 @@ Calibration calibrate(std::span<const CalibrationSample> pool, const TargetShare
   for (std::size_t i = 0; i < sorted.size(); ++i)
     passing[i + 1] = passing[i] + (sorted[i].passes_adaptation ? 1 : 0);
 
-  // The cut whose yield is closest to the wanted one; the lowest of equally close ones.
+  // Find the cut whose yield is closest to the wanted one; the lowest if several are equally close.
   const auto closest = [&](std::size_t first, double wanted, auto yield) {
     const std::vector<std::size_t> cuts = possible_cuts(sorted, first);
     return *std::min_element(cuts.begin(), cuts.end(), [&](std::size_t a, std::size_t b) {

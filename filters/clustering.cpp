@@ -31,12 +31,14 @@ double squared_distance(std::span<const double> a, std::span<const double> b) {
   return sum;
 }
 
-// [0, 1), the same on every platform (the standard's distributions are not).
+// Draws a number in [0, 1). The result is the same on every platform, unlike that of the standard's
+// distributions.
 double uniform(std::mt19937_64& random) {
   return static_cast<double>(random() >> 11) * 0x1p-53;
 }
 
-// The index that `at` (0 .. sum of weights) falls on; weights of 0 are never drawn while others are left.
+// Returns the index that `at` (0 .. sum of weights) falls on. An index of weight 0 is never drawn while
+// others are left.
 std::size_t pick(const std::vector<double>& weights, double at) {
   std::size_t last = 0;
   for (std::size_t i = 0; i < weights.size(); ++i) {
@@ -88,7 +90,8 @@ Clustering assign(const Rows& points, const Rows& centres) {
   return result;
 }
 
-// Means of the clusters; an empty cluster restarts at the point that lies farthest from its own centre.
+// Computes the means of the clusters. An empty cluster restarts at the point that lies farthest from its own
+// centre.
 Rows means(const Rows& points, Clustering& clustering, std::size_t clusters) {
   Rows centres{std::vector<double>(clusters * points.dimensions), points.dimensions};
   std::vector<std::size_t> counts(clusters);

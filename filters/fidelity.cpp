@@ -27,7 +27,7 @@ Judgement not_finite(std::string_view detail) {
   return judgement;
 }
 
-// The first of the least finite values; curve[0] is finite.
+// Returns the index of the first of the least finite values; curve[0] is finite.
 std::size_t best_iterate(std::span<const double> curve) {
   std::size_t best = 0;
   for (std::size_t i = 1; i < curve.size(); ++i) {
@@ -36,7 +36,7 @@ std::size_t best_iterate(std::span<const double> curve) {
   return best;
 }
 
-// NaN when no iterate of the window was measured.
+// Returns the relative gain within the window; NaN if none of its iterates was measured.
 double gain_within(std::span<const double> curve, int window) {
   double least = std::numeric_limits<double>::infinity();
   const std::size_t end = std::min(curve.size(), static_cast<std::size_t>(window) + 1);
@@ -53,7 +53,7 @@ std::optional<Judgement> find_failure(std::span<const double> curve) {
   return std::nullopt;
 }
 
-// Of a sample whose iterate `kept` would be its label.
+// Judges a sample whose label would be the iterate `kept`.
 Judgement judge_iterate(std::span<const double> curve, std::size_t kept, const Thresholds& thresholds) {
   Judgement judgement;
   judgement.initial_error = curve[0];

@@ -57,7 +57,7 @@ Judgement apply_bounds(Judgement judgement, const LabelMeasures& measures, const
     discard(judgement, Reason::too_few_keypoints,
             fmt::format("{} visible keypoints, visible_min {}", measures.visible, bounds.visible_min));
   }
-  // NaN is never beyond a bound.
+  // A comparison with NaN is false, so NaN never exceeds a bound.
   const auto at_most = [&](double value, double bound, Reason reason, const char* name) {
     if (bound > 0.0 && value > bound) {
       discard(judgement, reason, fmt::format("{0} {1:.4g}, {0}_max {2:.4g}", name, value, bound));

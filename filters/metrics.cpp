@@ -59,7 +59,7 @@ Points align(const Points& predicted, const Points& truth) {
   if ((svd.matrixU() * svd.matrixV().transpose()).determinant() < 0) flip(2, 2) = -1;
   const Eigen::Matrix3d rotation = svd.matrixV() * flip * svd.matrixU().transpose();
   const double spread = centred.squaredNorm();
-  // Points that coincide have no extent to scale.
+  // If all points coincide, there is no extent to scale.
   const double scale = spread > 0 ? (rotation * covariance).trace() / spread : 0.0;
   return (scale * rotation * centred).colwise() + to;
 }

@@ -20,7 +20,7 @@ std::uint16_t band_value(std::uint64_t hash, std::size_t band) {
   return static_cast<std::uint16_t>(hash >> (kBandBits * band));
 }
 
-// Which group each picture belongs to; groups are named by their least member.
+// Keeps which group each picture belongs to. A group is named by its smallest member.
 class Groups {
  public:
   explicit Groups(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0U); }
@@ -81,7 +81,7 @@ void HashIndex::search(std::uint64_t hash, std::vector<Match>& matches) const {
         const std::uint64_t differing = hash ^ band.hashes[i];
         const int distance = std::popcount(differing);
         if (distance > max_distance_) continue;
-        // It is reported from the first band that is near, and from no other.
+        // A match is reported only from the first band that is near.
         bool reported = false;
         for (std::size_t earlier = 0; earlier < b && !reported; ++earlier) {
           reported = std::popcount(band_value(differing, earlier)) <= near;
@@ -110,7 +110,8 @@ std::optional<Likeness> nearest_likeness(const HashIndex& references, const mani
 
 std::vector<std::vector<std::uint32_t>> groups_alike(std::span<const manifests::PictureHash> pictures,
                                                      int max_distance) {
-  // Pictures of equal hashes are one entry: frames of a still camera would else be compared each with each.
+  // Pictures with equal hashes share one entry. Otherwise all frames of a still camera would be compared with
+  // each other.
   std::unordered_map<std::uint64_t, std::uint32_t> first_of;
   std::vector<std::uint64_t> distinct;
   std::vector<std::uint64_t> mirrored;

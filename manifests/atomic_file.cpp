@@ -15,8 +15,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// In the target's folder, because rename works only within a file system. Process and counter keep two
-// writers of one path apart.
+// The temporary file lies in the target's folder, because rename works only within a file system. Process id
+// and counter keep two writers of one path apart.
 fs::path temporary_name(const fs::path& path) {
   static std::atomic<unsigned> counter{0};
   return path.parent_path() / fmt::format("{}.{}.{}.tmp", path.filename().string(), ::getpid(), counter++);

@@ -35,7 +35,7 @@ std::int64_t now_ns() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(now).count();
 }
 
-// Cuts the next space-separated field off `text`.
+// Cuts the next field, which ends at a space, off `text`.
 std::string_view next_field(std::string_view& text) {
   const std::size_t space = std::min(text.find(' '), text.size());
   const std::string_view field = text.substr(0, space);

@@ -19,7 +19,7 @@ herr_t take_innermost(unsigned depth, const H5E_error2_t* error, void* out) {
   return 0;
 }
 
-// No exception may cross the library.
+// This must not throw, because no exception may cross the library.
 herr_t take_name(hid_t, const char* name, const H5L_info_t*, void* out) try {
   static_cast<std::vector<std::string>*>(out)->emplace_back(name);
   return 0;

@@ -1,6 +1,6 @@
-// HDF5's in-memory driver, with memory functions of our own that keep the image when the file closes. The
-// library's H5Fget_file_image would be shorter, but that of 1.10 clears a flag of the superblock without
-// renewing its checksum, and no reader accepts the result.
+// This uses HDF5's in-memory driver with memory functions of our own, which keep the image when the file
+// closes. The library's H5Fget_file_image would be shorter, but in 1.10 it clears a flag of the superblock
+// without renewing its checksum, and no reader accepts the result.
 #include "manifests/hdf5_memory_file.h"
 
 #include <fmt/format.h>
@@ -40,7 +40,7 @@ H5FD_file_image_callbacks_t MemoryFile::callbacks(Memory* memory) {
     }
     return grown;
   };
-  // The image stays Memory's; it is the driver's only buffer.
+  // Memory keeps the image, which is the driver's only buffer.
   calls.image_free = [](void*, H5FD_file_image_op_t, void*) -> herr_t { return 0; };
   calls.udata_copy = [](void* user) { return user; };
   calls.udata_free = [](void*) -> herr_t { return 0; };
@@ -56,7 +56,7 @@ MemoryFile::MemoryFile() : memory_(std::make_unique<Memory>()) {
   check(H5Pset_libver_bounds(access.get(), H5F_LIBVER_V18, H5F_LIBVER_V18), "library version bounds");
   const Handle creation(H5Pcreate(H5P_FILE_CREATE), H5Pclose, "file creation properties");
   check(H5Pset_obj_track_times(creation.get(), false), "file creation properties");
-  // HDF5 first looks whether the name exists on disk; no name below /dev/null ever does.
+  // HDF5 first checks whether the name exists on disk. A name below /dev/null never does.
   file_.emplace(H5Fcreate("/dev/null/table", H5F_ACC_TRUNC, creation.get(), access.get()), H5Fclose,
                 "in-memory file");
 }

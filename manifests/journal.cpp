@@ -26,7 +26,7 @@ std::string to_payload(const JournalEntry& entry) {
       .dump();
 }
 
-// Nothing for a line that is not a whole journal line.
+// Returns nothing if the line is not a complete journal line.
 std::optional<JournalEntry> parse_line(std::string_view line) {
   const auto payload = open_line(line);
   if (!payload) return std::nullopt;

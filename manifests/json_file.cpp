@@ -37,8 +37,8 @@ bool is_token_char(char c) {
          c == '.';
 }
 
-// Whether a bare word is a number that JSON cannot hold. Most words are short plain numbers, so the tests
-// that cost little come first.
+// Returns whether a bare word is a number that JSON cannot hold. Most words are short plain numbers, so the
+// cheap tests come first.
 bool is_no_json_number(std::string_view word) {
   if (word == "NaN" || word == "Infinity" || word == "-Infinity") return true;
   const bool is_number = word[0] == '-' || (word[0] >= '0' && word[0] <= '9');
@@ -131,7 +131,7 @@ std::string describe(const nlohmann::json& value) {
   if (value.is_string()) {
     const auto& text = value.get_ref<const std::string&>();
     std::size_t shown = std::min(text.size(), kShown);
-    // Never cut a UTF-8 character: what is said here is stored as JSON again.
+    // Never cut a UTF-8 character, because this description is stored as JSON again.
     while (shown > 0 && shown < text.size() && (static_cast<unsigned char>(text[shown]) & 0xC0U) == 0x80U)
       --shown;
     return fmt::format("the text \"{}{}\"", text.substr(0, shown), shown < text.size() ? "..." : "");

@@ -1,5 +1,5 @@
-// The canonical serialisation: tagged with its version, members in the order below, text with its length
-// before it, numbers as little-endian bits with one bit pattern for NaN.
+// The canonical serialisation is tagged with its version. It has the members in the order below, text with
+// its length before it, and numbers as little-endian bits with one bit pattern for NaN.
 #include <bit>
 #include <cmath>
 #include <limits>

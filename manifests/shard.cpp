@@ -65,7 +65,7 @@ void add_column(Table& table, const ShardColumn& column, const std::vector<Shard
   }
 }
 
-// Magic and schema, in that order, before anything else of the file is looked at.
+// Checks magic and schema, in that order, before anything else of the file is read.
 std::filesystem::path check_identity(const std::filesystem::path& path) {
   const auto attributes = read_table_attributes(path);
   const auto format = attributes.find("format");

@@ -52,7 +52,7 @@ ShardColumn keypoint_numbers(std::string name, Shape shape, std::string units, s
   return {std::move(name), std::move(units), std::move(meaning), std::move(column)};
 }
 
-// 0 or 1.
+// A flag, stored as 0 or 1.
 template <typename Get, typename Set>
 ShardColumn flag(std::string name, std::string meaning, Get get, Set set) {
   NumberColumn column{ElementType::uint8, {}, {}, {}};
@@ -72,7 +72,7 @@ ShardColumn flag(std::string name, std::string meaning, bool ShardSample::*membe
       [member](ShardSample& sample, bool value) { sample.*member = value; });
 }
 
-// A flag of the annotation's body: 0, and passed over on reading, where there is none.
+// A flag of the annotation's body. Without a body it is 0, and reading skips it.
 ShardColumn truth_flag(std::string name, std::string meaning, bool BodyTruth::*member) {
   return flag(
       std::move(name), std::move(meaning),
@@ -105,7 +105,7 @@ ShardColumn text(std::string name, std::string meaning, Access access) {
                  [access](ShardSample& sample, std::string value) { access(sample) = std::move(value); }}};
 }
 
-// An enumeration under its stable names.
+// An enumeration, stored by its stable names.
 template <typename Access, typename Enum>
 ShardColumn names(std::string name, std::string meaning, Access access,
                   Enum (*from_string)(std::string_view)) {

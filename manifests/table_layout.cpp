@@ -23,7 +23,7 @@ constexpr std::string_view kOffsetsSuffix = "_offsets";
   throw std::runtime_error(fmt::format("{}: {}", name, why));
 }
 
-// One dataset as it lies in the file, checked to lie inside it.
+// The position of one dataset, which was checked to lie inside the file.
 struct Layout {
   std::optional<ElementType> type;  // empty: text
   std::vector<std::int64_t> extents;
@@ -64,7 +64,7 @@ void read_extents(const std::string& name, hid_t dataset, std::int64_t element_b
     if (!std::in_range<std::int64_t>(extent)) refuse(name, fmt::format("an extent of {} overflows", extent));
     layout.extents.push_back(static_cast<std::int64_t>(extent));
   }
-  // The row first: a table without rows must not hide a row whose size overflows.
+  // Compute the size of a row first: a table without rows must not hide a row whose size overflows.
   layout.row_bytes = element_bytes;
   for (std::size_t axis = 1; axis < layout.extents.size(); ++axis) {
     if (layout.extents[axis] == 0) refuse(name, fmt::format("axis {} is empty", axis));
@@ -123,13 +123,13 @@ std::int64_t read_rows(hid_t file) {
   return rows;
 }
 
-// Attributes of other types are passed over: who wants one of them will miss it.
+// Attributes of other types are skipped. A caller that needs one of them will notice that it is missing.
 std::map<std::string, std::string> read_attributes(hid_t file, std::uint64_t file_bytes) {
   H5O_info_t root{};
   check(H5Oget_info(file, &root), "root group");
   std::map<std::string, std::string> attributes;
   for (hsize_t i = 0; i < root.num_attrs; ++i) {
-    // In native order, for the reason that link_names() gives.
+    // List in native order; link_names() gives the reason.
     const Handle attribute(
         H5Aopen_by_idx(file, ".", H5_INDEX_NAME, H5_ITER_NATIVE, i, H5P_DEFAULT, H5P_DEFAULT), H5Aclose,
         "attributes");
@@ -186,7 +186,7 @@ std::map<std::string, TableReader::Column> read_columns(hid_t hdf5_file, const F
   for (const std::string& name : hdf5::link_names(hdf5_file, "dataset names")) {
     const Layout& layout = layouts[name] = read_layout(name, hdf5_file, file_bytes);
     total += static_cast<std::uint64_t>(layout.bytes);
-    // Datasets that share bytes could claim the file's size many times over.
+    // Overlapping datasets could claim the size of the file many times over.
     if (total > file_bytes) refuse(name, "the datasets together claim more bytes than the file has");
   }
   std::map<std::string, TableReader::Column> columns;

@@ -35,7 +35,7 @@ SpeciesOfName names_of(const CurationRule& rule) {
   return species_of;
 }
 
-// Empty when it is not listed.
+// Returns the listed species for a name; empty if there is none.
 std::string listed_species(const SpeciesOfName& species_of, std::string_view name) {
   while (!name.empty()) {
     const auto found = species_of.find(name);
@@ -46,7 +46,7 @@ std::string listed_species(const SpeciesOfName& species_of, std::string_view nam
   return {};
 }
 
-// By species alone; the pictures that may be drawn stay `not_drawn`.
+// Decides by species only. The pictures that may be drawn stay `not_drawn`.
 std::vector<Curated> by_species(std::span<const CuratedPicture> pictures, const CurationRule& rule) {
   const SpeciesOfName species_of = names_of(rule);
   std::vector<Curated> choices;

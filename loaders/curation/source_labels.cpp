@@ -29,7 +29,7 @@ struct SourcePicture {
   throw std::runtime_error(fmt::format("{}: {}: got {}, expected {}", file.string(), place, got, expected));
 }
 
-// The value, or null where the object lacks it or is none.
+// Returns the value of a key, or null if the object lacks it or is not an object.
 const json& value_of(const json& object, const char* key) {
   static const json kNull;
   if (!object.is_object()) return kNull;
@@ -37,7 +37,7 @@ const json& value_of(const json& object, const char* key) {
   return found == object.end() ? kNull : *found;
 }
 
-// An id as text: files write it as a number or, where it is a key, as a text.
+// Returns an id as text. Files write it as a number or, if it is a key, as a text.
 std::string id_of(const json& value, const std::filesystem::path& file, const std::string& place) {
   if (value.is_number_integer()) return std::to_string(value.get<std::int64_t>());
   if (value.is_string()) return value.get<std::string>();
@@ -81,7 +81,7 @@ std::map<std::string, std::string> read_categories(const json& document, const s
   return names;
 }
 
-// An annotation of a picture or category that the file does not list says nothing.
+// An annotation whose picture or category is not listed in the file tells nothing.
 void read_species(const json& document, const std::filesystem::path& file,
                   std::map<std::string, SourcePicture>& pictures) {
   const std::map<std::string, std::string> categories = read_categories(document, file);

@@ -18,7 +18,7 @@ const keypoints::Topology& kingdom() {
   return keypoints::topology("animal_kingdom23");
 }
 
-// Species, family, and whether a quadruped's body can show the animal at all.
+// Reads species and family, and whether the body of a quadruped can represent the animal at all.
 void add_animal(Loading& loading, RecordReader& reader, SampleRecord& sample) {
   const species::AnimalClass animal{reader.optional_text("animal_parent_class"),
                                     reader.optional_text("animal_class"),
@@ -32,7 +32,7 @@ void add_animal(Loading& loading, RecordReader& reader, SampleRecord& sample) {
   }
 }
 
-// The list has no box: `center` and `scale` give a square of the same centre and longer side.
+// The list has no box. `center` and `scale` give a square with the same centre and longer side.
 manifests::Box read_mpii_box(RecordReader& reader) {
   const auto center = reader.numbers("center", 2, 1, Reason::box_missing, Reason::record_malformed);
   const auto scale = reader.number("scale");

@@ -35,7 +35,7 @@ std::vector<std::string> names_in(const nlohmann::json& category) {
   return names;
 }
 
-// The keypoint names that the categories list; empty when none does.
+// Returns the keypoint names that the categories list; empty if none lists any.
 std::vector<std::string> keypoint_names(const nlohmann::json& document, const Loading& loading) {
   std::vector<std::string> names;
   const auto categories = document.find("categories");
@@ -90,7 +90,7 @@ struct CocoFile {
   bool ids_are_distinct = false;                                        // of the annotations
 };
 
-// Returns how many repeat an id: the first of each is taken.
+// Indexes the images by id. If several have the same id, the first is used. Returns how many repeat an id.
 std::size_t index_images(const nlohmann::json& images, CocoFile& file) {
   std::size_t repeated = 0;
   for (const auto& [key, image] : images.items()) {
@@ -133,7 +133,7 @@ CocoFile index_file(const nlohmann::json& document, const keypoints::Topology& t
   return file;
 }
 
-// Picture, size and sub-dataset from the image that the annotation points to.
+// Reads picture, size and sub-dataset from the image that the annotation points to.
 void read_image(const CocoFile& file, std::size_t index, Loading& loading, RecordReader& annotation,
                 SampleRecord& sample) {
   const std::string name = std::to_string(file.ids_are_distinct ? *id_in(file.annotations[index], "id")
@@ -158,8 +158,8 @@ void read_image(const CocoFile& file, std::size_t index, Loading& loading, Recor
   sample.source = image.optional_text("source_dataset");
 }
 
-// Returns the box around the keypoints where the annotation has none and the rules allow it; sample.box is
-// then NaN.
+// Reads an annotation. If it has no box and the rules allow it, returns a box around the keypoints;
+// sample.box is then NaN.
 std::optional<manifests::Box> read_annotation(const CocoFile& file, std::size_t index, Loading& loading,
                                               RecordReader& annotation, const CocoRules& rules,
                                               SampleRecord& sample) {

@@ -49,13 +49,13 @@ std::optional<Family> family_of_supercategory(const std::string& supercategory) 
   return Family::none;
 }
 
-// The rule that leaves the animal of this name out, or "".
+// Returns the rule that leaves the animal of this name out, or "".
 std::string left_out_as(const std::string& name) {
   return species::not_a_quadruped({.parent_class = {}, .animal_class = {}, .subclass = {}, .animal = name});
 }
 
-// The user's word, else the category's name where it is an animal's, else what the picture's name tells, else
-// the category's name as it stands.
+// The species is the one that the user gives. Without one, it is the category's name if that is an animal's,
+// else what the picture's name tells, else the category's name as it stands.
 std::string species_of(const Category& category, const Loading& loading, const SampleRecord& sample) {
   if (!loading.options.species.empty()) return species::normalised_species(loading.options.species);
   const std::string named = species::normalised_species(category.name);

@@ -24,7 +24,7 @@ constexpr std::array<std::pair<const char*, Parser>, 5> kParsers{{{"prima", load
                                                                   {"coco", load_coco_labels},
                                                                   {"deeplabcut", load_deeplabcut}}};
 
-// Name and split are the first two parts of sample ids and must stay tellable from the rest.
+// Name and split are the first two parts of a sample id and must be separable from the rest.
 void require_id_part(const std::string& part, const char* option) {
   const bool is_usable = !part.empty() && part.find_first_of("/#\\") == std::string::npos &&
                          std::none_of(part.begin(), part.end(), [](unsigned char c) { return c < 0x20; });

@@ -24,7 +24,7 @@ using manifests::Keypoint;
 using manifests::Reason;
 using manifests::SampleRecord;
 
-// Keypoints that belong to no animal are filed under this individual.
+// DeepLabCut files keypoints that belong to no animal under this individual.
 constexpr std::string_view kNoAnimal = "single";
 
 struct PointColumns {
@@ -38,7 +38,7 @@ struct Individual {
   std::vector<PointColumns> points;  // in the topology's order
 };
 
-// The columns of one individual's keypoints by name, as they come in the file.
+// The columns of one individual's keypoints by name, in the order of the file.
 struct FoundColumns {
   std::vector<std::string> bodyparts;
   std::map<std::string, std::map<std::string, std::size_t>> of_bodypart;  // coordinate -> column
@@ -101,8 +101,8 @@ std::vector<Individual> individuals_of(const LabelTable& table, const keypoints:
   return individuals;
 }
 
-// A frame's number -> the picture whose name ends in it ("frames/img0012.png"). Predictions of a video have
-// nothing else to tell their pictures by.
+// Maps the number of a frame to the picture whose name ends in it ("frames/img0012.png"). The predictions of
+// a video have no other link to their pictures.
 class NumberedPictures {
  public:
   explicit NumberedPictures(const fs::path& folder) {
@@ -118,7 +118,8 @@ class NumberedPictures {
     }
   }
 
-  // The number itself where there is no such picture, or more than one: no file has that name.
+  // Returns the number itself if there is no such picture or more than one. No file has that name, so the
+  // record fails.
   std::string name_of(const std::string& row) const {
     std::int64_t number = -1;
     std::from_chars(row.data(), row.data() + row.size(), number);
@@ -130,8 +131,8 @@ class NumberedPictures {
   std::map<std::int64_t, std::set<std::string>> names_;
 };
 
-// Without a likelihood v is 1: labelled. A point without coordinates is not labelled, whatever its
-// likelihood.
+// Without a likelihood, v is 1, which means labelled. A point without coordinates is not labelled, whatever
+// its likelihood.
 bool set_point(const LabelTable& table, std::size_t row, const PointColumns& columns, Keypoint& point) {
   const double x = table.at(row, columns.x);
   const double y = table.at(row, columns.y);
@@ -175,8 +176,8 @@ class DeepLabCutLoader {
   }
 
  private:
-  // The file that is named, or a project's labels below the folder that is named: CollectedData_*.h5, and the
-  // .csv of a folder that has no .h5.
+  // Returns the file that is named, or a project's labels below the folder that is named: CollectedData_*.h5,
+  // and the .csv where there is no .h5 beside it.
   std::vector<fs::path> label_files() const {
     const fs::path given = loading_.file;
     if (!fs::is_directory(given)) return {given};
@@ -243,7 +244,7 @@ class DeepLabCutLoader {
     set_family(loading_, std::nullopt, species::family_of_species(sample.species), sample);
   }
 
-  // Ids end in the individual where that tells all samples apart, else in the sample's index.
+  // Makes ids end in the individual if that makes all of them unique, else in the sample's index.
   void name_samples() {
     std::set<std::string> ids;
     for (const SampleRecord& record : records_) ids.insert(record.id);

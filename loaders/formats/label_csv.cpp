@@ -1,5 +1,6 @@
-// DeepLabCut's CSV: a header row a level ("scorer", "individuals" where there are several, "bodyparts",
-// "coords"), then a row a frame. The frame's name stands in the first cell, or in the first three.
+// DeepLabCut's CSV. It has one header row for each level ("scorer", "individuals" if there are several,
+// "bodyparts", "coords") and then one row for each frame. The name of the frame is in the first cell or in
+// the first three.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -21,12 +22,13 @@ using manifests::CsvReader;
 constexpr std::uintmax_t kMaxFileBytes = std::uintmax_t{4} << 30U;
 constexpr std::array<std::string_view, 4> kLevels{"scorer", "individuals", "bodyparts", "coords"};
 
-// The header's rows, and the first of the frames' in `cells` (empty when there is none).
+// The header's rows.
 struct Header {
   std::vector<std::vector<std::string>> levels;
   std::size_t name_cells = 1;  // leading cells that name a frame
 };
 
+// Reads the header. `cells` then holds the first row of the frames (empty if there is none).
 Header read_header(CsvReader& lines, std::vector<std::string>& cells) {
   Header header;
   while (lines.next(cells)) {

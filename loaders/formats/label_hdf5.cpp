@@ -40,14 +40,14 @@ constexpr std::chrono::seconds kMaxTime{600};
   throw std::runtime_error(fmt::format("{}: got {}, expected {}", name, got, expected));
 }
 
-// One dataset, opened and its extents known.
+// An open dataset with its extents.
 struct StoredDataset {
   Handle id;
   Handle type;
   std::vector<hsize_t> extents;
 };
 
-// A link could lead to another file.
+// Refuses links, because they could lead to another file.
 void require_own(hid_t parent, const std::string& name, const std::string& where) {
   H5L_info_t link{};
   if (H5Lexists(parent, name.c_str(), H5P_DEFAULT) <= 0) refuse(where, "nothing", "an object of this name");
@@ -68,12 +68,12 @@ class PandasGroup {
   std::string text_attribute(const std::string& attribute) const;
   std::int64_t integer_attribute(const std::string& attribute) const;
   StoredDataset open(const std::string& member, std::size_t rank) const;
-  // Throws when the file cannot hold what the dataset claims.
+  // Throws if the file cannot hold what the dataset claims.
   void check_size(const StoredDataset& dataset, const std::string& member, std::uint64_t element_bytes) const;
 
   std::vector<std::string> names(const std::string& member) const;  // texts, or whole numbers as text
   std::vector<std::int64_t> integers(const std::string& member) const;
-  // Rows of names from `<prefix>_levelI` and `<prefix>_labelI`.
+  // Returns rows of names from `<prefix>_levelI` and `<prefix>_labelI`.
   std::vector<std::vector<std::string>> multi_index(const std::string& prefix) const;
 
  private:
@@ -243,7 +243,7 @@ void read_fixed(const PandasGroup& group, LabelTable& table) {
         group.path("block0_values"));
 }
 
-// The part of the table's rows that is wanted, as it will lie in memory: the index, then the numbers.
+// The wanted part of the table's rows, as it will lie in memory: the index, then the numbers.
 struct TableRow {
   Handle type;
   std::size_t index_bytes;
@@ -305,7 +305,8 @@ void read_rows(const PandasGroup& group, LabelTable& table) {
   }
 }
 
-// The group that holds a DataFrame: DeepLabCut's own name, else the only group there is.
+// Returns the group that holds the DataFrame: the one with DeepLabCut's name, else the only group of the
+// file.
 std::string frame_group(hid_t file) {
   constexpr const char* kUsual = "df_with_missing";
   if (H5Lexists(file, kUsual, H5P_DEFAULT) > 0) return kUsual;
@@ -328,7 +329,7 @@ LabelTable read_open_file(hid_t file, std::uint64_t file_bytes) {
   return table;
 }
 
-// A table as bytes and back, for the way between two processes of one machine.
+// These convert a table to bytes and back, to pass it between two processes of one machine.
 std::string packed(const LabelTable& table) {
   nlohmann::json columns = nlohmann::json::array();
   for (const LabelColumn& column : table.columns) {
@@ -359,13 +360,13 @@ LabelTable unpacked(const std::string& bytes) {
   return table;
 }
 
-// With HDF5's lock held.
+// Must be called with HDF5's lock held.
 LabelTable read_file(const std::filesystem::path& file) {
   const Handle opened(H5Fopen(file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose, "HDF5");
   return read_open_file(opened.get(), std::filesystem::file_size(file));
 }
 
-// Calls `read`, and names the file where it fails.
+// Calls `read` and adds the file's name to the error if it fails.
 template <typename Read>
 LabelTable naming(const std::filesystem::path& file, Read read) {
   try {
@@ -378,7 +379,7 @@ LabelTable naming(const std::filesystem::path& file, Read read) {
 }  // namespace
 
 LabelTable read_label_hdf5(const std::filesystem::path& file) {
-  // The lock is taken here: no other thread may hold it when the child begins.
+  // The lock is taken here, because no other thread may hold it when the child begins.
   const manifests::hdf5::Session session;
   return naming(file, [&file] {
     return unpacked(in_own_process([&file] { return packed(read_file(file)); }, kMaxTime));

@@ -17,7 +17,7 @@
 namespace q3d::loaders::formats {
 namespace {
 
-// The first byte of the answer; what follows is the value, or why there is none.
+// The first byte of the answer. The rest is the value, or the reason why there is none.
 constexpr char kValue = 'v';
 constexpr char kRefusal = 'r';
 
@@ -25,7 +25,7 @@ constexpr char kRefusal = 'r';
   throw std::system_error(errno, std::generic_category(), what);
 }
 
-// False when the reader is gone.
+// Returns false if the reader is gone.
 bool write_all(int descriptor, const std::string& bytes) {
   std::size_t at = 0;
   while (at < bytes.size()) {

@@ -15,8 +15,8 @@
 namespace q3d::loaders::formats {
 namespace {
 
-// The names lie in a tuple in a list in a tuple in a list. Limits keep what a few bytes can claim small: a
-// memo repeats a value for three bytes, and each level of lists costs two.
+// The names are in a tuple in a list in a tuple in a list. Limits bound what a few bytes can claim, because a
+// memo repeats a value for three bytes and each level of lists costs two.
 constexpr int kDeepest = 4;
 constexpr std::size_t kMaxNames = 8;  // of one column
 constexpr std::size_t kMaxNameBytes = 1000;
@@ -113,7 +113,7 @@ class Unpickler {
     return pickle_.substr(start, end - start);
   }
 
-  // What is pushed is bounded: each push takes a byte, and values are shared, not copied.
+  // The stack is bounded, because each push takes a byte of the pickle, and values are shared, not copied.
   void push(Value value) { stack_.push_back(std::move(value)); }
 
   const Value& top() const {

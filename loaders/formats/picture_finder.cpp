@@ -33,7 +33,8 @@ bool climbs_out(const fs::path& normal) {
   return !normal.empty() && *normal.begin() == "..";
 }
 
-// Paths that people would call the same: case, '+' for a space, .jpeg and .jpe for .jpg.
+// Returns the same text for paths that people would call the same: regardless of case, '+' for a space, and
+// .jpeg or .jpe for .jpg.
 std::string folded(const fs::path& path) {
   std::string text = path.generic_string();
   for (char& c : text) c = c == '+' ? ' ' : static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
@@ -141,7 +142,7 @@ std::optional<FoundPicture> PictureFinder::by_spelling(const fs::path& relative)
   return picture;
 }
 
-// Nothing when there is no such file; a failure when there is one that must not or cannot be read.
+// Returns nothing if there is no such file, and a failure if it must not or cannot be read.
 std::optional<FoundPicture> PictureFinder::existing(const fs::path& path) {
   std::error_code error;
   const fs::file_status own = fs::symlink_status(path, error);
@@ -154,7 +155,8 @@ std::optional<FoundPicture> PictureFinder::existing(const fs::path& path) {
     }
     if (fs::is_directory(resolved, error)) return std::nullopt;
   } else {
-    // Most pictures share few folders: resolving each folder once saves a system call a component.
+    // Most pictures share few folders, so resolving each folder once saves one system call for each path
+    // component.
     fs::path& folder = resolved_folders_[path.parent_path().string()];
     if (folder.empty()) folder = fs::canonical(path.parent_path(), error);
     resolved = folder / path.filename();

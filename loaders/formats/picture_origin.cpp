@@ -12,7 +12,7 @@ std::size_t digits_at(std::string_view text, std::size_t at) {
   return count;
 }
 
-// Nothing follows, or another part after '_'.
+// True if nothing follows, or another part after '_'.
 bool ends_at(std::string_view text, std::size_t at) {
   return at >= text.size() || text[at] == '_';
 }

@@ -20,7 +20,7 @@ constexpr std::size_t kPoseNumbers = manifests::kNumJoints * 3;
 constexpr std::size_t kBetas = manifests::kNumBetas;
 constexpr std::size_t kFirstBetas = 20;  // `shape`; the other 21 are `shape_extra`
 
-// `values` come from a reader that has checked their number; they fit.
+// `values` come from a reader that has checked their number, so they fit.
 template <std::size_t N>
 void copy_into(std::array<float, N>& target, const std::vector<double>& values, std::size_t at = 0) {
   std::transform(values.begin(), values.end(), target.begin() + static_cast<std::ptrdiff_t>(at),
@@ -46,7 +46,8 @@ void read_betas(const nlohmann::json& record, RecordReader& reader, Loading& loa
   }
 }
 
-// Truth is what is not all zero: converters write zeros for pictures without a body.
+// A body counts as given only if its numbers are not all zero, because converters write zeros for pictures
+// without a body.
 std::optional<BodyTruth> read_truth(const nlohmann::json& record, RecordReader& reader, Loading& loading,
                                     const std::string& id) {
   BodyTruth truth;
@@ -69,7 +70,7 @@ std::optional<BodyTruth> read_truth(const nlohmann::json& record, RecordReader& 
   return truth;
 }
 
-// -1 and nothing at all both mean "not stated".
+// -1 and a missing value both mean that the family is not stated.
 std::optional<Family> read_family(RecordReader& reader) {
   const auto number = reader.integer("supercategory");
   if (!number || *number == -1) return std::nullopt;
@@ -80,7 +81,8 @@ std::optional<Family> read_family(RecordReader& reader) {
   return std::nullopt;
 }
 
-// A mask that is not there, or is the picture itself (as the official AcinoSet converter writes it), is none.
+// A mask that does not exist, or is the picture itself (as the official AcinoSet converter writes it), is
+// ignored.
 void set_mask(RecordReader& reader, Loading& loading, SampleRecord& sample) {
   const std::string name = reader.optional_text("mask_path");
   if (name.empty() || reader.failed()) return;

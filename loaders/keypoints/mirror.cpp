@@ -22,7 +22,8 @@ void require_size(const char* what, std::size_t got, std::size_t expected) {
   throw std::invalid_argument(fmt::format("{}: got {} numbers, expected {}", what, got, expected));
 }
 
-// SMAL's joints: each limb's four, and the ears.
+// Returns the mirror image of each joint. The four joints of each limb and the ears are pairs of left and
+// right; every other joint is its own mirror image.
 constexpr std::array<std::size_t, kJoints> mirrored_joints() {
   std::array<std::size_t, kJoints> partner{};
   std::iota(partner.begin(), partner.end(), std::size_t{0});
@@ -37,7 +38,7 @@ constexpr std::array<std::size_t, kJoints> mirrored_joints() {
   return partner;
 }
 
-// diag(left) R diag(right), whose entries are 1 or -1.
+// Replaces R by diag(left) R diag(right), where the entries of both are 1 or -1.
 void change_signs(float* rotation, const std::array<float, 3>& left, const std::array<float, 3>& right) {
   for (std::size_t row = 0; row < 3; ++row) {
     for (std::size_t column = 0; column < 3; ++column)

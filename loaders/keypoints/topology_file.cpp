@@ -62,7 +62,7 @@ class Reader {
     return value.get<std::string>();
   }
 
-  // The place of a keypoint of this topology.
+  // Returns the index of a keypoint of this topology.
   int place(const json& value, const std::string& key) const {
     const std::string name = text(value, key);
     const auto& names = topology_.keypoints;

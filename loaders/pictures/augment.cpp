@@ -9,7 +9,7 @@
 namespace q3d::loaders::pictures {
 namespace {
 
-// Uniform in [0, 1) with 53 bits.
+// Draws a uniform number in [0, 1) with 53 bits.
 double uniform(std::mt19937_64& engine) {
   return static_cast<double>(engine() >> 11) * 0x1.0p-53;
 }
@@ -38,8 +38,8 @@ cv::Vec3d axis_angle_from_matrix(const cv::Matx33d& r) {
   const double angle = std::atan2(sine, cosine);
   if (sine > 1e-5) return skew * (angle / (2.0 * sine));
   if (cosine > 0.0) return {0.0, 0.0, 0.0};
-  // A half turn, where the skew part vanishes: (R + I) / 2 = axis axis^T. The largest column gives the axis;
-  // the sign is the one with a non-negative first non-zero component, as OpenCV chooses.
+  // For a half turn the skew part vanishes: (R + I) / 2 = axis axis^T. The largest column gives the axis. Its
+  // sign makes the first non-zero component positive, as in OpenCV.
   const cv::Matx33d outer = (r + cv::Matx33d::eye()) * 0.5;
   int column = 0;
   for (int i = 1; i < 3; ++i) {

@@ -110,7 +110,7 @@ void normalise_patch(const cv::Mat& patch_rgb, const std::array<double, 3>& colo
     throw std::invalid_argument(
         fmt::format("normalise_patch: got room for {} numbers, expected {}", planes.size(), 3 * plane_size));
   }
-  // 256 possible values a channel: compute each once.
+  // A channel has 256 possible values, so each is computed once.
   std::array<std::array<float, 256>, 3> table{};
   for (std::size_t c = 0; c < 3; ++c) {
     const auto mean = static_cast<float>(255.0 * kImageMean[c]);

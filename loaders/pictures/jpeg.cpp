@@ -73,7 +73,7 @@ void read_rows(Decoder& decoder) {
   jpeg_finish_decompress(&decoder.info);
 }
 
-// False when libjpeg gave up inside `step`.
+// Returns false if libjpeg gave up inside `step`.
 bool run(Decoder& decoder, void (*step)(Decoder&)) {
   if (setjmp(decoder.give_up) != 0) return false;
   step(decoder);
@@ -89,7 +89,8 @@ DecodedImage failed(const Decoder& decoder) {
       {}, Reason::image_not_an_image, fmt::format("JPEG that cannot be decoded: {}", decoder.message.data())};
 }
 
-// As PIL's CMYK;I and convert('RGB'): the stored bytes are inverted ink, black scales the rest.
+// Converts as PIL's CMYK;I and convert('RGB') do: the stored bytes are inverted ink, and black scales the
+// rest.
 cv::Mat rgb_from_inverted_cmyk(const cv::Mat& cmyk) {
   cv::Mat rgb(cmyk.size(), CV_8UC3);
   for (int y = 0; y < cmyk.rows; ++y) {

@@ -36,7 +36,7 @@ struct Chunk {
   }
 };
 
-// The chunk at the start of `rest`; empty when the file ends before it does.
+// Returns the chunk at the start of `rest`; empty if the file ends before the chunk does.
 Chunk chunk_at(std::span<const unsigned char> rest) {
   if (rest.size() < kChunkFrame) return {};
   const std::size_t size = big_endian(rest.data()) + kChunkFrame;
@@ -48,7 +48,7 @@ DecodedImage damaged(std::string what) {
   return {{}, Reason::image_not_an_image, "damaged PNG: " + what};
 }
 
-// The chunks that make the pixels, so far.
+// The chunks with pixels that were read so far.
 struct PixelChunks {
   std::vector<unsigned char> file{kSignature.begin(), kSignature.end()};
   bool has_header = false;
@@ -57,7 +57,7 @@ struct PixelChunks {
   bool has_pixels = false;
 };
 
-// Takes a chunk in; says what is wrong with it, or "". libpng would say it too, but on stderr.
+// Adds a chunk and returns what is wrong with it, or "". libpng would report it too, but on stderr.
 std::string add_chunk(const Chunk& chunk, PixelChunks& pixels) {
   const bool is_header = chunk.type == "IHDR";
   const bool is_word =

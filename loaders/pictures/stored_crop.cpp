@@ -70,8 +70,8 @@ void add_row(const std::uint8_t* row, int channels, const std::vector<Span>& col
   }
 }
 
-// Mean over the area below each target pixel; what lies outside the image counts as black. Unlike cv::resize
-// it needs no padded copy of the region, which for a large box could be many times the image.
+// Averages over the area below each target pixel; pixels outside the image count as black. Unlike cv::resize
+// this needs no padded copy of the region, which for a large box could be many times the image.
 cv::Mat reduced(const cv::Mat& image, const Region& region, int side_px) {
   const double step = static_cast<double>(region.side_px) / side_px;
   const std::vector<Span> columns = spans(region.left_px, step, side_px, image.cols);
@@ -117,7 +117,7 @@ StoredCrop make_stored_crop(const cv::Mat& rgb, const cv::Mat& mask, const Squar
   StoredCrop crop;
   crop.rgb = cut(rgb);
   if (!mask.empty()) crop.mask = cut(mask);
-  // Pixel centres: the corner of pixel x lies at x - 0.5, and corners map to corners.
+  // Coordinates refer to pixel centres: the corner of pixel x lies at x - 0.5, and corners map to corners.
   const double factor = static_cast<double>(side_px) / region.side_px;
   const auto shift = [&](int start_px) { return (0.5 - start_px) * factor - 0.5; };
   crop.from_image = {factor, 0.0, shift(region.left_px), 0.0, factor, shift(region.top_px)};

@@ -23,7 +23,7 @@ bool is_number(std::string_view text) {
   return !text.empty() && is_digits(text, text.size());
 }
 
-// `word` is `name` or its last words.
+// Returns whether `word` is `name` or its last words.
 bool ends_with_word(std::string_view name, std::string_view word) {
   return name == word ||
          (name.size() > word.size() && name.ends_with(word) && name[name.size() - word.size() - 1] == ' ');
@@ -40,7 +40,7 @@ std::vector<std::string> split_names(std::string_view subclass) {  // "Dog / Wol
   return names;
 }
 
-// `n02412080_12159` -> 2412080.
+// Returns the number of a synset: `n02412080_12159` -> 2412080.
 std::optional<int> synset(std::string_view stem) {
   if (stem.empty() || stem[0] != 'n' || !is_digits(stem.substr(1), 8)) return std::nullopt;
   int number = 0;
@@ -109,7 +109,7 @@ std::optional<Family> family_of_species(std::string_view species) {
     for (const auto& [family, names] : table::kFamilies) {
       if (std::find(names.begin(), names.end(), name) != names.end()) return family;
     }
-    // Then without its first word: "polar bear" is in the table as "bear".
+    // Then try the name without its first word: "polar bear" is in the table as "bear".
     const auto space = name.find(' ');
     name = space == std::string_view::npos ? std::string_view() : name.substr(space + 1);
   }
