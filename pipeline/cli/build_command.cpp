@@ -77,8 +77,7 @@ config::BuildConfig configured(const Arguments& arguments) {
 
 Command add_build(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command =
-      app.add_subcommand("build", "make a versioned dataset of labels from annotated photographs");
+  CLI::App* command = declare(app, "build");
   command
       ->add_option("-c,--config", arguments->configs,
                    "JSON config file; keys of a later file replace those of an earlier one")

@@ -87,8 +87,7 @@ nlohmann::ordered_json to_json(const build::CalibrationSummary& summary) {
 
 Command add_calibrate(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command =
-      app.add_subcommand("calibrate", "find the thresholds that give the wanted shares of labels");
+  CLI::App* command = declare(app, "calibrate");
   command
       ->add_option("-c,--config", arguments->configs,
                    "JSON config file; keys of a later file replace those of an earlier one")

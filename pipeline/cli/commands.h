@@ -5,9 +5,38 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 
+#include <array>
 #include <functional>
+#include <string_view>
 
 namespace q3d::pipeline::cli {
+
+struct CommandInfo {
+  std::string_view name;
+  std::string_view description;  // one line of `quadruped3d --help`
+  bool needs_network;            // links LibTorch, and is therefore in the program quadruped3d-network
+};
+inline constexpr std::array<CommandInfo, 15> kCommands{{
+    {"build", "make a versioned dataset of labels from annotated photographs", true},
+    {"calibrate", "find the thresholds that give the wanted shares of labels", true},
+    {"verify", "read a whole dataset and check every byte of it", false},
+    {"inspect", "show what a dataset or a shard contains, as text or as a picture", false},
+    {"sample", "render pictures of quadrupeds with known 3D truth, in the layouts of public datasets", true},
+    {"init", "write an untrained checkpoint, or the synthetic body model and its priors", true},
+    {"train", "train a network from shards", true},
+    {"evaluate", "measure a network on test sets with the paper's metrics", true},
+    {"compare", "test whether one network is better than another on the same pictures", true},
+    {"evaluate-labels", "measure how close the labels of a build are to known truth", true},
+    {"compare-labels", "test which of two builds' rules keep the more accurate labels, at equal yield", true},
+    {"config", "show a whole config, with all defaults", false},
+    {"explain", "show all that is known of one candidate, and why it got its verdict", false},
+    {"leakage", "find pictures of the pool that are also in a test set, or twice in the pool", false},
+    {"curate", "choose a balanced subset of a large dataset, by species; build takes the list", false},
+}};
+
+// Declares the command on the application, with its description. Throws std::logic_error for a name that
+// kCommands lacks.
+CLI::App* declare(CLI::App& app, std::string_view name);
 
 // A command that was chosen: runs it and returns the exit code. Throws ConfigError, Interrupted,
 // std::exception.

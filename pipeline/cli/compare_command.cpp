@@ -53,8 +53,7 @@ int run(const Arguments& arguments) {
 Command add_compare(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   evaluation::CompareOptions& options = arguments->options;
-  CLI::App* command =
-      app.add_subcommand("compare", "test whether one network is better than another on the same pictures");
+  CLI::App* command = declare(app, "compare");
   command->add_option("--before", arguments->before, "folders that `evaluate` wrote, one for each seed")
       ->required()
       ->check(CLI::ExistingPath);

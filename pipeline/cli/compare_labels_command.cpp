@@ -53,8 +53,7 @@ int run(const Arguments& arguments) {
 
 Command add_compare_labels(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand(
-      "compare-labels", "test which of two builds' rules keep the more accurate labels, at equal yield");
+  CLI::App* command = declare(app, "compare-labels");
   command->add_option("--before", arguments->before, "folders that `evaluate-labels --report` wrote")
       ->required()
       ->check(CLI::ExistingDirectory);

@@ -31,7 +31,7 @@ int show(const Arguments& arguments) {
 
 Command add_config(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand("config", "show a whole config, with all defaults");
+  CLI::App* command = declare(app, "config");
   command->require_subcommand(1);
   CLI::App* shown = command->add_subcommand(
       "show", "print the config as JSON, with its profile expanded and all defaults filled in");

@@ -53,8 +53,7 @@ void print_summary(const curation::CurationSummary& summary) {
 
 Command add_curate(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand(
-      "curate", "choose a balanced subset of a large dataset, by species; build takes the list");
+  CLI::App* command = declare(app, "curate");
   command
       ->add_option("-c,--config", arguments->configs,
                    "JSON file with the rule; keys of a later file replace those of an earlier one")

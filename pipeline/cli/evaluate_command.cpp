@@ -67,8 +67,7 @@ void add_settings(CLI::App& command, evaluation::EvaluationOptions& options) {
 
 Command add_evaluate(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command =
-      app.add_subcommand("evaluate", "measure a network on test sets with the paper's metrics");
+  CLI::App* command = declare(app, "evaluate");
   command
       ->add_option("-c,--config", arguments->configs,
                    "JSON config file; keys of a later file replace those of an earlier one")

@@ -20,8 +20,7 @@ struct Arguments {
 
 Command add_explain(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command =
-      app.add_subcommand("explain", "show all that is known of one candidate, and why it got its verdict");
+  CLI::App* command = declare(app, "explain");
   command->add_option("dataset", arguments->dataset, "a dataset's folder, or an output folder of `build`")
       ->required()
       ->check(CLI::ExistingPath);

@@ -26,8 +26,7 @@ struct Arguments {
 
 Command add_init(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command =
-      app.add_subcommand("init", "write an untrained checkpoint, or the synthetic body model and its priors");
+  CLI::App* command = declare(app, "init");
   command->add_option("-o,--out", arguments->out, "write an untrained checkpoint to this file (safetensors)");
   command->add_option("-s,--size", arguments->size, "size of the network: vith (the paper's), small or tiny")
       ->capture_default_str();

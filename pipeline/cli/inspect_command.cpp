@@ -24,8 +24,7 @@ struct Arguments {
 
 Command add_inspect(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command =
-      app.add_subcommand("inspect", "show what a dataset or a shard contains, as text or as a picture");
+  CLI::App* command = declare(app, "inspect");
   command->add_option("path", arguments->path, "a dataset's folder, an output folder, or one shard")
       ->required()
       ->check(CLI::ExistingPath);

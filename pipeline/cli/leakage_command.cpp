@@ -51,8 +51,7 @@ void print_summary(const leakage::LeakageRunSummary& summary, const std::filesys
 
 Command add_leakage(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand(
-      "leakage", "find pictures of the pool that are also in a test set, or twice in the pool");
+  CLI::App* command = declare(app, "leakage");
   command
       ->add_option("-c,--config", arguments->configs,
                    "JSON config file; keys of a later file replace those of an earlier one")

@@ -24,8 +24,7 @@ struct Arguments {
 Command add_sample(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   world::WorldOptions& options = arguments->world;
-  CLI::App* command = app.add_subcommand(
-      "sample", "render pictures of quadrupeds with known 3D truth, in the layouts of public datasets");
+  CLI::App* command = declare(app, "sample");
   command->add_option("-o,--out", options.out, "folder to create")->required();
   command->add_option("--seed", options.seed, "the same seed gives the same bytes")->capture_default_str();
   command->add_option("--share", options.share, "share of the default number of pictures to render")

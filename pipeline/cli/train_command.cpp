@@ -39,7 +39,7 @@ nlohmann::ordered_json to_json(const training::TrainingSummary& summary) {
 
 Command add_train(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand("train", "train a network from shards");
+  CLI::App* command = declare(app, "train");
   command
       ->add_option("-c,--config", arguments->configs,
                    "JSON config file; keys of a later file replace those of an earlier one")

@@ -21,7 +21,7 @@ struct Arguments {
 
 Command add_verify(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand("verify", "read a whole dataset and check every byte of it");
+  CLI::App* command = declare(app, "verify");
   command
       ->add_option("dataset", arguments->dataset,
                    "a dataset's folder, or an output folder (its newest dataset is checked)")

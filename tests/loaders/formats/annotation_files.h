@@ -11,7 +11,7 @@
 #include "loaders/keypoints/topology.h"
 #include "tests/support/paths.h"
 
-namespace q3d::loaders::formats {
+namespace q3d::loaders::formats::testing_files {
 
 using nlohmann::json;
 
@@ -137,4 +137,4 @@ inline std::string joined(const std::vector<std::string>& notes) {
   return text;
 }
 
-}  // namespace q3d::loaders::formats
+}  // namespace q3d::loaders::formats::testing_files

@@ -10,8 +10,8 @@ namespace q3d::loaders::keypoints {
 namespace {
 
 using ::testing::HasSubstr;
-using testing_files::json;
-using testing_files::write_text;
+using formats::testing_files::json;
+using formats::testing_files::write_text;
 
 Topology shipped(const std::string& file) {
   return read_topology_file(q3d::testing::source_dir() / "configs/topologies" / (file + ".json"));

@@ -1,0 +1,23 @@
+// quadruped3d-network: the commands that need LibTorch. quadruped3d starts it.
+
+#include <array>
+
+#include "pipeline/cli/network_program.h"
+#include "pipeline/cli/program.h"
+
+int main(int argc, char** argv) {
+  namespace cli = q3d::pipeline::cli;
+  if (!cli::waiting_is_decided()) return cli::start_again_passively(argv);
+  constexpr std::array<cli::CommandEntry, 9> kEntries{{
+      {"build", cli::add_build},
+      {"calibrate", cli::add_calibrate},
+      {"sample", cli::add_sample},
+      {"init", cli::add_init},
+      {"train", cli::add_train},
+      {"evaluate", cli::add_evaluate},
+      {"compare", cli::add_compare},
+      {"evaluate-labels", cli::add_evaluate_labels},
+      {"compare-labels", cli::add_compare_labels},
+  }};
+  return cli::run_program(argc, argv, kEntries);
+}

@@ -1,0 +1,100 @@
+#include "pipeline/cli/program.h"
+
+#include <fmt/format.h>
+
+#include <opencv2/core.hpp>
+
+#include <algorithm>
+#include <cstdio>
+#include <new>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "pipeline/run/errors.h"
+#include "pipeline/run/interrupt.h"
+#include "pipeline/run/version.h"
+
+namespace q3d::pipeline::cli {
+namespace {
+
+constexpr int kFailure = 1;
+constexpr int kUsage = 2;
+constexpr int kInterrupted = 130;
+
+// Adds every command in the order of kCommands; returns those that this program can run.
+std::vector<std::pair<std::string, Command>> add_commands(CLI::App& app,
+                                                          std::span<const CommandEntry> entries) {
+  std::vector<std::pair<std::string, Command>> commands;
+  for (const CommandInfo& info : kCommands) {
+    const auto entry = std::find_if(entries.begin(), entries.end(), [&](const CommandEntry& candidate) {
+      return candidate.name == info.name;
+    });
+    if (entry == entries.end()) {
+      declare(app, info.name);
+    } else {
+      commands.emplace_back(info.name, entry->add(app));
+    }
+  }
+  return commands;
+}
+
+int parse_and_run(int argc, char** argv, std::span<const CommandEntry> entries) {
+  CLI::App app{
+      "Builds 3D datasets of quadrupeds: it adds pseudo-3D labels (SMAL pose, shape, camera) to photographs\n"
+      "that have 2D keypoints, and records for every label how it was made and why it was kept or dropped."};
+  app.name("quadruped3d");
+  app.require_subcommand(1);
+  app.set_version_flag("--version", "quadruped3d " + std::string(run::version()));
+  app.footer(
+      "First steps:\n"
+      "  quadruped3d sample --out data/world                 render pictures to try the program with\n"
+      "  quadruped3d init --size small --out data/small.safetensors\n"
+      "  quadruped3d calibrate --config configs/sample.json --out out --write out/thresholds.json\n"
+      "  quadruped3d build --config configs/sample.json --config out/thresholds.json --out out\n"
+      "  quadruped3d verify out\n"
+      "`quadruped3d COMMAND --help` explains a command with examples.");
+  const auto commands = add_commands(app, entries);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : kUsage;
+  }
+  for (const auto& [name, command] : commands) {
+    if (app.got_subcommand(name)) return command();
+  }
+  return kUsage;
+}
+
+}  // namespace
+
+CLI::App* declare(CLI::App& app, std::string_view name) {
+  for (const CommandInfo& info : kCommands) {
+    if (info.name == name) return app.add_subcommand(std::string(name), std::string(info.description));
+  }
+  throw std::logic_error("no such command: " + std::string(name));
+}
+
+int run_program(int argc, char** argv, std::span<const CommandEntry> entries) {
+  cv::setNumThreads(1);  // the flow graph's threads are the only ones
+  run::install_interrupt_handlers();
+  try {
+    return parse_and_run(argc, argv, entries);
+  } catch (const run::Interrupted&) {
+    fmt::print(stderr, "stopped; run the same command to continue\n");
+    return kInterrupted;
+  } catch (const run::ConfigError& error) {
+    fmt::print(stderr, "quadruped3d: {}\n", error.what());
+    return kUsage;
+  } catch (const std::bad_alloc&) {
+    fmt::print(stderr,
+               "quadruped3d: out of memory; use a smaller network.batch, tta.batch or shards.unit_size\n");
+    return kFailure;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "quadruped3d: {}\n", error.what());
+    return kFailure;
+  }
+}
+
+}  // namespace q3d::pipeline::cli
