@@ -2,11 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <stdexcept>
-#include <thread>
 
 #include "pipeline/network/torch_bodies.h"
+#include "pipeline/network/torch_network.h"
 
 namespace q3d::pipeline::build {
 namespace {
@@ -22,18 +21,13 @@ device::PriorNumbers load_priors(const std::filesystem::path& file) {
   }
 }
 
-int operator_threads(const config::NetworkConfig& network) {
-  if (network.compute_threads > 0) return network.compute_threads;
-  return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-}
-
 }  // namespace
 
 unit::MeasuringModels load_measuring_models(const config::BuildConfig& config) {
   unit::MeasuringModels models;
   if (unit::needs_meshes(config.guards)) {
     models.meshes = network::load_body_meshes(config.network.smal_asset);
-    network::use_compute_threads(operator_threads(config.network));
+    network::use_compute_threads(network::compute_threads(config.network));
   }
   if (config::uses_priors(config.guards)) models.priors = load_priors(config::priors_file(config));
   return models;

@@ -73,10 +73,6 @@ model::DeviceChoice choose_device(const std::string& name) {
   }
 }
 
-int resolved_threads(int wanted) {
-  return wanted > 0 ? wanted : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-}
-
 model::TtaOptions tta_options(const config::TtaConfig& tta) {
   model::TtaOptions options;
   options.objective = tta.objective == "demo" ? model::TtaObjective::demo : model::TtaObjective::paper;
@@ -100,7 +96,7 @@ model::TtaSchedule schedule_of(const device::AdaptRequest& request) {
 class TorchNetwork : public device::Network {
  public:
   TorchNetwork(const config::NetworkConfig& network, const config::TtaConfig& tta)
-      : threads_(resolved_threads(network.compute_threads)),
+      : threads_(compute_threads(network)),
         predict_batch_(static_cast<std::size_t>(network.batch)),
         adapt_batch_(static_cast<std::size_t>(tta.batch)),
         options_(tta_options(tta)),
@@ -185,9 +181,15 @@ std::unique_ptr<device::Network> load_network(const config::NetworkConfig& netwo
   return std::make_unique<TorchNetwork>(network, tta);
 }
 
+int compute_threads(const config::NetworkConfig& network) {
+  if (network.compute_threads > 0) return network.compute_threads;
+  if (std::filesystem::file_size(network.checkpoint) < kSmallCheckpointBytes) return 1;
+  return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+}
+
 std::string device_key(const config::NetworkConfig& network) {
   const bool on_cpu = choose_device(network.device).device.is_cpu();
-  return on_cpu ? fmt::format("cpu-{}", resolved_threads(network.compute_threads)) : "cuda";
+  return on_cpu ? fmt::format("cpu-{}", compute_threads(network)) : "cuda";
 }
 
 void write_initial_checkpoint(const std::filesystem::path& path, const std::string& size,

@@ -16,6 +16,14 @@ namespace q3d::pipeline::network {
 std::unique_ptr<device::Network> load_network(const config::NetworkConfig& network,
                                               const config::TtaConfig& tta);
 
+// A checkpoint below this size is that of a small network: its operators are too short to share.
+inline constexpr std::uintmax_t kSmallCheckpointBytes = std::uintmax_t{64} << 20U;
+
+// Threads of one CPU operator: the config's number, or, where that is 0, all cores for a large network and
+// one for a small one. A small network's results then do not depend on the number of cores either. Throws
+// std::filesystem::filesystem_error when the checkpoint is missing.
+int compute_threads(const config::NetworkConfig& network);
+
 // What of device and threads decides the bits: "cpu-2", "cuda". Part of the stage keys; loads nothing.
 // Throws as load_network does.
 std::string device_key(const config::NetworkConfig& network);
