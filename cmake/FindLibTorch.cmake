@@ -3,7 +3,7 @@
 # The wheel's own TorchConfig.cmake demands a CUDA toolkit at build time. Nothing here needs one: the program
 # uses CUDA only at run time, through LibTorch. Set LIBTORCH_ROOT to the folder that holds include/ and lib/.
 if(NOT LIBTORCH_ROOT)
-  file(GLOB _q3d_torch_candidates "${CMAKE_SOURCE_DIR}/.venv/lib/python3*/site-packages/torch")
+  file(GLOB _q3d_torch_candidates "${PROJECT_SOURCE_DIR}/.venv/lib/python3*/site-packages/torch")
   if(_q3d_torch_candidates)
     list(GET _q3d_torch_candidates 0 _q3d_torch_root)
     set(LIBTORCH_ROOT "${_q3d_torch_root}" CACHE PATH "Folder of LibTorch (include/ and lib/)" FORCE)
@@ -43,7 +43,6 @@ if(LibTorch_FOUND AND NOT TARGET LibTorch::LibTorch)
   set_target_properties(LibTorch::LibTorch PROPERTIES
     INTERFACE_INCLUDE_DIRECTORIES "${LIBTORCH_INCLUDE_DIR};${LIBTORCH_INCLUDE_DIR}/torch/csrc/api/include"
     INTERFACE_SYSTEM_INCLUDE_DIRECTORIES "${LIBTORCH_INCLUDE_DIR};${LIBTORCH_INCLUDE_DIR}/torch/csrc/api/include"
-    INTERFACE_LINK_LIBRARIES "-Wl,--push-state,--no-as-needed -lstdc++ ${_q3d_torch_link} -Wl,--pop-state"
-    INTERFACE_LINK_OPTIONS "-Wl,-rpath,${LIBTORCH_ROOT}/lib")
+    INTERFACE_LINK_LIBRARIES "-Wl,--push-state,--no-as-needed -lstdc++ ${_q3d_torch_link} -Wl,--pop-state")
   unset(_q3d_torch_libs)
 endif()

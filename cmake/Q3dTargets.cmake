@@ -12,9 +12,11 @@ target_compile_options(q3d_options INTERFACE $<$<CXX_COMPILER_ID:GNU>:-fno-tree-
 target_compile_definitions(q3d_options INTERFACE FMT_HEADER_ONLY=1)
 
 # One precompiled <torch/torch.h> for every target that sees LibTorch: it turns 15 s a file into a few.
-add_library(q3d_torch_pch STATIC "${PROJECT_SOURCE_DIR}/cmake/torch_pch.cpp")
-target_link_libraries(q3d_torch_pch PUBLIC q3d_options LibTorch::LibTorch)
-target_precompile_headers(q3d_torch_pch PUBLIC <torch/torch.h>)
+if(Q3D_LIBTORCH)
+  add_library(q3d_torch_pch STATIC "${PROJECT_SOURCE_DIR}/cmake/torch_pch.cpp")
+  target_link_libraries(q3d_torch_pch PUBLIC q3d_options LibTorch::LibTorch)
+  target_precompile_headers(q3d_torch_pch PUBLIC <torch/torch.h>)
+endif()
 
 # The same for every other target: parsing nlohmann-json and fmt takes longer than most of our sources.
 add_library(q3d_plain_pch STATIC "${PROJECT_SOURCE_DIR}/cmake/plain_pch.cpp")
@@ -53,21 +55,26 @@ endfunction()
 # What tools/check_rooms.py reads: a line a room.
 file(WRITE "${PROJECT_BINARY_DIR}/rooms.tsv" "")
 
-# q3d_room(JOB text [SOURCES ...] [PUBLIC libs] [PRIVATE libs] [TORCH] [PLAIN sources])
+# q3d_room(JOB text [SOURCES ...] [PUBLIC libs] [PRIVATE libs] [TORCH] [PLAIN sources] [INSTALL])
 # The room of this folder: one folder, one namespace, one static target, one include root. The target's name is the
 # folder's path: pipeline/unit is q3d_pipeline_unit. TORCH adds LibTorch and its precompiled header; the sources after
-# PLAIN do without that header, which makes them quicker to compile.
+# PLAIN do without that header, which makes them quicker to compile. INSTALL makes it a
+# part of the CMake package (cmake/Q3dInstall.cmake).
 function(q3d_room)
-  cmake_parse_arguments(ARG "TORCH" "JOB" "SOURCES;PLAIN;PUBLIC;PRIVATE" ${ARGN})
+  cmake_parse_arguments(ARG "TORCH;INSTALL" "JOB" "SOURCES;PLAIN;PUBLIC;PRIVATE" ${ARGN})
   file(RELATIVE_PATH folder "${PROJECT_SOURCE_DIR}" "${CMAKE_CURRENT_SOURCE_DIR}")
   string(REPLACE "/" "_" name "q3d_${folder}")
   add_library(${name} STATIC ${ARG_SOURCES} ${ARG_PLAIN})
   q3d_include_root(${name} PUBLIC)
-  target_link_libraries(${name} PUBLIC q3d_options ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
+  target_compile_features(${name} PUBLIC cxx_std_20)
+  target_link_libraries(${name} PUBLIC ${ARG_PUBLIC} PRIVATE "$<BUILD_INTERFACE:q3d_options>" ${ARG_PRIVATE})
   q3d_precompiled(${name} "${ARG_TORCH}")
   if(ARG_TORCH)
     target_link_libraries(${name} PUBLIC LibTorch::LibTorch)
     set_source_files_properties(${ARG_PLAIN} PROPERTIES SKIP_PRECOMPILE_HEADERS ON)
+  endif()
+  if(ARG_INSTALL)
+    q3d_install_room(${name} ${folder})
   endif()
   set(rooms ${ARG_PUBLIC} ${ARG_PRIVATE})
   list(FILTER rooms INCLUDE REGEX "^q3d_")

@@ -1,0 +1,64 @@
+# `cmake --install`, the CMake package and the .deb.
+#
+# PREFIX/bin/quadruped3d                 the program; it starts the next one
+# PREFIX/libexec/quadruped3d             quadruped3d-network, which links LibTorch
+# PREFIX/lib/quadruped3d/torch           LibTorch: a link to its folder, or a copy (see docs/install.md)
+# PREFIX/lib, include/quadruped3d        the rooms that need no LibTorch, for other projects
+# PREFIX/lib/cmake/quadruped3d           find_package(quadruped3d)
+# PREFIX/share/quadruped3d               configs, the small network, licences
+#
+# No file of it holds a path of the machine that built it.
+include(GNUInstallDirs)
+include(CMakePackageConfigHelpers)
+
+# In the build folder the program finds LibTorch where it was found; installed, relative to itself.
+if(LIBTORCH_ROOT)
+  set(CMAKE_BUILD_RPATH "${LIBTORCH_ROOT}/lib")
+endif()
+
+# q3d_install_room(TARGET FOLDER): the library and its headers; in the package as quadruped3d::FOLDER, with _ for /.
+function(q3d_install_room target folder)
+  string(REPLACE "/" "_" name "${folder}")
+  set_target_properties(${target} PROPERTIES EXPORT_NAME ${name})
+  add_library(quadruped3d::${name} ALIAS ${target})
+  target_include_directories(${target} PUBLIC "$<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/quadruped3d>")
+  install(TARGETS ${target} EXPORT quadruped3dTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+  file(GLOB headers CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/*.h")
+  install(FILES ${headers} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/quadruped3d/${folder})
+endfunction()
+
+function(q3d_install_programs)
+  set(libexec "${CMAKE_INSTALL_LIBEXECDIR}/quadruped3d")
+  set_target_properties(quadruped3d-network PROPERTIES INSTALL_RPATH "$ORIGIN/../../lib/quadruped3d/torch/lib")
+  install(TARGETS quadruped3d RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+  install(TARGETS quadruped3d-network RUNTIME DESTINATION ${libexec})
+  install(DIRECTORY configs models DESTINATION ${CMAKE_INSTALL_DATADIR}/quadruped3d)
+  install(FILES LICENSE THIRD_PARTY_NOTICES.md CITATION.cff README.md
+          DESTINATION ${CMAKE_INSTALL_DATADIR}/quadruped3d)
+endfunction()
+
+function(q3d_install_package)
+  set(folder "${CMAKE_INSTALL_LIBDIR}/cmake/quadruped3d")
+  install(EXPORT quadruped3dTargets NAMESPACE quadruped3d:: DESTINATION ${folder})
+  configure_package_config_file(cmake/quadruped3dConfig.cmake.in "${PROJECT_BINARY_DIR}/quadruped3dConfig.cmake"
+                                INSTALL_DESTINATION ${folder})
+  write_basic_package_version_file("${PROJECT_BINARY_DIR}/quadruped3dConfigVersion.cmake"
+                                   COMPATIBILITY SameMinorVersion)
+  install(FILES "${PROJECT_BINARY_DIR}/quadruped3dConfig.cmake" "${PROJECT_BINARY_DIR}/quadruped3dConfigVersion.cmake"
+                cmake/FindOpenCVMinimal.cmake
+          DESTINATION ${folder})
+  if(PROJECT_IS_TOP_LEVEL)
+    q3d_install_programs()
+    set(CPACK_GENERATOR DEB)
+    set(CPACK_PACKAGE_CONTACT "the quadruped3d contributors")
+    set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "Builds 3D datasets of quadrupeds from photographs with 2D keypoints")
+    set(CPACK_RESOURCE_FILE_LICENSE "${PROJECT_SOURCE_DIR}/LICENSE")
+    set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+    set(CPACK_DEBIAN_PACKAGE_SECTION science)
+    # dpkg-shlibdeps does not know LibTorch, which is no Debian package.
+    set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS OFF)
+    set(CPACK_DEBIAN_PACKAGE_DEPENDS
+        "libembree3-3, libhdf5-103-1, libjpeg62-turbo, libopencv-core406, libopencv-imgcodecs406, libopencv-imgproc406, libssl3, libtbb12, zlib1g")
+    include(CPack)
+  endif()
+endfunction()
