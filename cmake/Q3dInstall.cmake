@@ -30,6 +30,7 @@ endfunction()
 function(q3d_install_programs)
   set(libexec "${CMAKE_INSTALL_LIBEXECDIR}/quadruped3d")
   set_target_properties(quadruped3d-network PROPERTIES INSTALL_RPATH "$ORIGIN/../../lib/quadruped3d/torch/lib")
+  install(DIRECTORY DESTINATION lib/quadruped3d)  # where LibTorch is linked
   install(TARGETS quadruped3d RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
   install(TARGETS quadruped3d-network RUNTIME DESTINATION ${libexec})
   install(DIRECTORY configs models DESTINATION ${CMAKE_INSTALL_DATADIR}/quadruped3d)

@@ -24,6 +24,15 @@ def table(page: str, heading: str) -> list[list[str]]:
     return [[cell.strip().replace("`", "") for cell in line.strip("|").split("|")] for line in lines[2:]]
 
 
+def literals() -> str:
+    """All text of the sources, with string literals that go on over several lines joined and unescaped."""
+    paths = [path for folder in (*SOURCES, "tools", "cmake") for path in (ROOT / folder).rglob("*")
+             if path.suffix in (".cpp", ".h", ".py", ".sh", ".cmake")]
+    text = "\n".join(path.read_text() for path in paths)
+    text = re.sub(r'"\s*\n\s*"', "", text).replace('\\"', '"')
+    return text.replace("{{", "{").replace("}}", "}")
+
+
 class BodyPage(unittest.TestCase):
     def test_keypoints_are_those_of_the_topology(self):
         source = source_with("Topology animal3d26()").split("Topology animal3d26()")[1].split("\n}\n")[0]
@@ -63,6 +72,21 @@ class TroubleshootingPage(unittest.TestCase):
         rows += table("troubleshooting.md", "Many candidates were discarded")
         explained = [name for row in rows for name in re.split(r",\s*", row[0])]
         self.assertEqual(sorted(explained), sorted(names[1:]))
+
+    def test_quoted_messages_are_those_of_the_program(self):
+        page = (ROOT / "docs" / "troubleshooting.md").read_text()
+        messages = re.findall(r"^\*\*`(.*?)`\*\*", page, re.MULTILINE)
+        self.assertGreater(len(messages), 30)
+        sources = literals()
+        of_the_system = ("No space left on device", "Could NOT find")
+        for message in messages:
+            text = re.sub(r"^(setup|warning): ", "", message).replace("'", "`")
+            parts = [part.strip(" :.") for part in text.split("...")]
+            for part in parts:
+                if len(part) < 12 or part.startswith(of_the_system):
+                    continue
+                with self.subTest(message=message):
+                    self.assertTrue(part in sources or part.replace("`", "'") in sources, f"no source says {part!r}")
 
 
 if __name__ == "__main__":
