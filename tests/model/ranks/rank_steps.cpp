@@ -212,7 +212,7 @@ int run(std::string mode, const std::string& out) {
 int main(int argc, char** argv) {
   if (argc != 3) return 2;
   try {
-    return q3d::model::run(argv[1], argv[2]);
+    return q3d::model::ranks::run(argv[1], argv[2]);
   } catch (const std::exception& error) {
     fmt::print(stderr, "{}\n", error.what());
     return 1;
