@@ -157,7 +157,7 @@ ask_for_upgrades() {
 }
 
 install_packages() {
-  local missing=() older wanted planned better bytes
+  local missing=() older wanted planned better bytes others
   mapfile -t missing < <(missing_packages)
   [ ${#missing[@]} -gt 0 ] || return 0
   open_log
@@ -180,8 +180,10 @@ install_packages() {
   fi
   ask_for_upgrades "$planned"
   bytes=$("${apt_install[@]}" -qq --print-uris "${wanted[@]}" 2>>"$log" | awk '{sum += $3} END {print sum + 0}')
-  say "installing ${#missing[@]} Debian packages and $(($(grep -c '^new ' <<<"$planned") - ${#missing[@]})) that they" \
-    "need ($((bytes / 1000000)) MB to download): ${missing[*]}"
+  others=$(grep -c '^new ' <<<"$planned" || true)
+  others=$((others > ${#missing[@]} ? others - ${#missing[@]} : 0))
+  say "Debian packages to install: ${#missing[@]} and $others that they depend on," \
+    "$(((bytes + 999999) / 1000000)) MB to download (${missing[*]})"
   run_apt "${apt_install[@]}" "${wanted[@]}" ||
     fail_with_log "apt-get could not install the Debian packages." "Once its cause is removed, run make setup again."
   mapfile -t missing < <(missing_packages)

@@ -149,7 +149,7 @@ class PackagesTest(SetupCase):
         code, messages = self.run_setup(rules)
         self.assertEqual(code, 0, messages)
         self.assertEqual(len(messages.splitlines()), 2, messages)
-        self.assertIn("installing 1 Debian packages and 1 that they need (7 MB to download): libhdf5-dev", messages)
+        self.assertIn("packages to install: 1 and 1 that they depend on, 7 MB to download (libhdf5-dev)", messages)
         *_, install = self.called("^apt-get")
         for option in ("-y", "--no-upgrade", "--no-remove", "--no-install-recommends"):
             self.assertIn(f" {option} ", install)
