@@ -3,9 +3,10 @@
 # LibTorch among them, in a virtual environment at .venv. It installs only what is missing, so a second run takes a
 # fraction of a second, and it repairs an installation that was interrupted. docs/install.md explains each dependency.
 #
-#   tools/setup.sh [--allow-upgrades] [--python-only]
+#   tools/setup.sh [--allow-upgrades | --no-upgrades] [--python-only]
 #
 #   --allow-upgrades  allow apt to upgrade an installed package if a missing one cannot be installed otherwise
+#   --no-upgrades     stop in that case; without either option setup asks, and upgrades where it cannot ask
 #   --python-only     leave the Debian packages alone and make .venv only (for users without root)
 #   PYTHON=python3.12 in the environment names the interpreter of .venv (default: python3)
 #
@@ -19,7 +20,7 @@ python=${PYTHON:-python3}
 lock_wait_s=${SETUP_LOCK_WAIT_S:-600}
 lock_poll_s=${SETUP_LOCK_POLL_S:-5}
 as_root=()
-allow_upgrades=no
+allow_upgrades=ask
 python_only=no
 worked=no
 
@@ -146,8 +147,13 @@ ask_for_upgrades() {
   [ ${#upgrades[@]} -gt 0 ] || return 0
   say "missing packages need newer versions of these ${#upgrades[@]} installed ones, which apt would upgrade:"
   printf '  %s\n' "${upgrades[@]}" >&2
-  [ "$allow_upgrades" = no ] || return 0
-  if [ -t 0 ]; then
+  [ "$allow_upgrades" != yes ] || return 0
+  if [ "$allow_upgrades" = ask ] && [ ! -t 0 ]; then
+    say "there is no terminal to ask at, and without them the build cannot go on: they are upgraded, nothing else is." \
+      "tools/setup.sh --no-upgrades refuses instead"
+    return 0
+  fi
+  if [ "$allow_upgrades" = ask ]; then
     local answer
     read -r -p "setup: upgrade them? [y/N] " answer
     case "$answer" in [yY] | [yY][eE][sS]) return 0 ;; esac
@@ -268,9 +274,10 @@ install_wheels() {
 for argument in "$@"; do
   case "$argument" in
     --allow-upgrades) allow_upgrades=yes ;;
+    --no-upgrades) allow_upgrades=no ;;
     --python-only) python_only=yes ;;
     *)
-      echo "usage: tools/setup.sh [--allow-upgrades] [--python-only]" >&2
+      echo "usage: tools/setup.sh [--allow-upgrades | --no-upgrades] [--python-only]" >&2
       exit 2
       ;;
   esac

@@ -193,9 +193,16 @@ class UpgradeTest(SetupCase):
         self.make_whole_venv()
         self.rules = [Rule("^dpkg-query", out="ii  cmake\nii  ninja-build", times=3), self.installed(*PACKAGES)]
 
-    def test_an_upgrade_needs_consent(self):
+    def test_without_a_terminal_only_what_is_needed_is_upgraded_and_named(self):
         rules = [*self.rules, Rule("^apt-get .*-s libhdf5-dev$", out=UPGRADE)]
         code, messages = self.run_setup(rules)
+        self.assertEqual(code, 0, messages)
+        self.assertIn("  libcurl4 7.1-1 -> 7.1-2\n", messages)
+        self.assertIn("no terminal to ask at", messages)
+
+    def test_an_upgrade_can_be_refused(self):
+        rules = [*self.rules, Rule("^apt-get .*-s libhdf5-dev$", out=UPGRADE)]
+        code, messages = self.run_setup(rules, "--no-upgrades")
         self.assertEqual(code, 1)
         self.assertIn("  libcurl4 7.1-1 -> 7.1-2\n", messages)
         self.assertIn("make setup ALLOW_UPGRADES=1", messages)
@@ -240,7 +247,7 @@ class UpgradeTest(SetupCase):
             Rule("^apt-get .*-s libhdf5-dev libcurl4-openssl-dev=7.1-1$", code=100),
             Rule("^apt-cache madison", out=" libcurl4-openssl-dev | 7.1-1 | http://x main"),
         ]
-        code, messages = self.run_setup(rules)
+        code, messages = self.run_setup(rules, "--no-upgrades")
         self.assertEqual(code, 1)
         self.assertIn("libcurl4 7.1-1 -> 7.1-2", messages)
 
