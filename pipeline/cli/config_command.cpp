@@ -3,15 +3,20 @@
 #include <cstdio>
 #include <memory>
 
+#include "manifests/atomic_file.h"
 #include "pipeline/cli/commands.h"
+#include "pipeline/config/config_schema.h"
 #include "pipeline/config/effective_config.h"
 #include "pipeline/config/profiles.h"
+#include "pipeline/config/settings_page.h"
 
 namespace q3d::pipeline::cli {
 namespace {
 
 struct Arguments {
   std::vector<std::filesystem::path> configs;
+  std::filesystem::path page;
+  bool writes = false;
 };
 
 int show(const Arguments& arguments) {
@@ -27,26 +32,67 @@ int show(const Arguments& arguments) {
   return 0;
 }
 
+int print_schema() {
+  fmt::print("{}\n", config::build_config_schema().dump(2));
+  return 0;
+}
+
+// Compares the page with the settings, or writes its tables anew.
+int make_tables(const Arguments& arguments) {
+  const std::string page = manifests::read_file(arguments.page);
+  const std::string wanted = config::with_settings_tables(page);
+  if (arguments.writes) {
+    manifests::write_file_atomically(arguments.page, wanted);
+  } else if (wanted != page) {
+    fmt::print(stderr,
+               "{0}: its tables differ from the settings; run: quadruped3d config tables {0} --write\n",
+               arguments.page.string());
+    return 1;
+  }
+  return 0;
+}
+
+CLI::App* add_show(CLI::App& command, Arguments& arguments) {
+  CLI::App* shown = command.add_subcommand(
+      "show", "print the config as JSON, with its profile expanded and all defaults filled in");
+  shown
+      ->add_option("-c,--config", arguments.configs,
+                   "JSON config file; keys of a later file replace those of an earlier one")
+      ->check(CLI::ExistingFile);
+  return shown;
+}
+
+CLI::App* add_tables(CLI::App& command, Arguments& arguments) {
+  CLI::App* tables =
+      command.add_subcommand("tables", "check the tables of settings in a page such as docs/config.md");
+  tables->add_option("page", arguments.page, "Markdown file with the tables' marks")
+      ->required()
+      ->check(CLI::ExistingFile);
+  tables->add_flag("--write", arguments.writes, "make the tables anew");
+  return tables;
+}
+
 }  // namespace
 
 Command add_config(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = declare(app, "config");
   command->require_subcommand(1);
-  CLI::App* shown = command->add_subcommand(
-      "show", "print the config as JSON, with its profile expanded and all defaults filled in");
-  shown
-      ->add_option("-c,--config", arguments->configs,
-                   "JSON config file; keys of a later file replace those of an earlier one")
-      ->check(CLI::ExistingFile);
+  CLI::App* shown = add_show(*command, *arguments);
+  CLI::App* schema = command->add_subcommand("schema", "print the JSON Schema of a config, for editors");
+  CLI::App* tables = add_tables(*command, *arguments);
   const char* const footer =
       "Examples:\n"
       "  quadruped3d config show                                  what each profile stands for\n"
       "  quadruped3d config show -c my.json -c out/thresholds.json\n"
-      "The output is a config again and gives the same dataset. docs/config.md explains every key.";
+      "  quadruped3d config schema > quadruped3d.schema.json\n"
+      "The output of `show` is a config again and gives the same dataset. docs/config.md explains every key.";
   command->footer(footer);
   shown->footer(footer);
-  return [arguments] { return show(*arguments); };
+  return [arguments, schema, tables] {
+    if (schema->parsed()) return print_schema();
+    return tables->parsed() ? make_tables(*arguments) : show(*arguments);
+  };
 }
 
 }  // namespace q3d::pipeline::cli

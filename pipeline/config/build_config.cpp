@@ -7,7 +7,7 @@
 #include <set>
 #include <string_view>
 
-#include "filters/near_duplicates.h"
+#include "pipeline/config/build_settings.h"
 #include "pipeline/config/config_layers.h"
 #include "pipeline/config/json_fields.h"
 #include "pipeline/config/profiles.h"
@@ -36,70 +36,33 @@ bool is_version(std::string_view text) {
          text.find("..") == std::string_view::npos;
 }
 
-// What only labels of one's own need: their keypoints are not known beforehand.
-void read_label_options(JsonFields& fields, DatasetConfig& options) {
-  const bool is_own = options.format == "coco" || options.format == "deeplabcut";
-  for (const char* key : {"topology", "species", "min_confidence", "box_margin"}) {
-    require(is_own || fields.child(key) == nullptr, fields.where(),
-            fmt::format("\"{}\" belongs to the formats \"coco\" and \"deeplabcut\", got it with \"{}\"", key,
-                        options.format));
+// Reads the keys that only labels of one's own have: their keypoints are not known beforehand.
+void read_own_labels(JsonFields& fields, DatasetConfig& dataset) {
+  const bool is_own = dataset.format == "coco" || dataset.format == "deeplabcut";
+  for (const Setting<DatasetConfig>& setting : own_label_settings()) {
+    require(is_own || fields.child(setting.key) == nullptr, fields.where(),
+            fmt::format("\"{}\" belongs to the formats \"coco\" and \"deeplabcut\", got it with \"{}\"",
+                        setting.key, dataset.format));
   }
-  if (!is_own) return;
-  std::string topology;
-  fields.require("topology", topology);
-  fields.read("species", options.species);
-  fields.read("min_confidence", options.min_confidence);
-  fields.read("box_margin", options.box_margin);
-  require(options.min_confidence >= 0 && options.min_confidence <= 1, fields.where(),
-          fmt::format("\"min_confidence\" must be 0 to 1, got {}", options.min_confidence));
-  require(options.box_margin >= 0 && options.box_margin <= 2, fields.where(),
-          fmt::format("\"box_margin\" must be 0 to 2, got {}", options.box_margin));
-  options.topology = topology;
+  if (is_own) read_settings(fields, own_label_settings(), dataset);
 }
 
 DatasetConfig parse_dataset(const json& object, const std::string& where) {
-  DatasetConfig options;
-  std::string root;
-  std::string annotations;
-  std::string images;
-  std::string role(to_string(options.role));
-  std::string curation;
-  std::string body_model;
-  std::string keypoints_3d = "file";
+  DatasetConfig dataset;
   JsonFields fields(object, where);
-  fields.require("name", options.name);
-  fields.require("format", options.format);
-  fields.require("root", root);
-  fields.require("annotations", annotations);
-  options.split = "train";
-  fields.read("split", options.split);
-  fields.read("images", images);
-  fields.read("role", role);
-  fields.read("curation", curation);
-  fields.read("body_model", body_model);
-  fields.read("keypoints_3d", keypoints_3d);
-  read_label_options(fields, options);
+  read_settings(fields, dataset_settings(), dataset);
+  read_own_labels(fields, dataset);
   fields.finish();
-  require_one_of(options.format, loaders::formats::dataset_formats(), where + ": format");
-  require(is_plain_name(options.name), where,
-          "\"name\" may hold letters, digits, '.', '_' and '-' only, got \"" + options.name + "\"");
-  require_one_of(role, role_names(), where + ": role");
-  options.role = role_from_string(role);
-  require(options.role != Role::truth || options.format == "prima", where,
+  require(is_plain_name(dataset.name), where,
+          "\"name\" may hold letters, digits, '.', '_' and '-' only, got \"" + dataset.name + "\"");
+  require(dataset.role != Role::truth || dataset.format == "prima", where,
           "\"role\": \"truth\" needs a format that gives bodies, which is \"prima\"; got \"" +
-              options.format + "\". For keypoints alone use \"2d_only\"");
-  require_one_of(keypoints_3d, {"file", "body"}, where + ": keypoints_3d");
-  require(body_model.empty() || options.role == Role::truth, where,
+              dataset.format + "\". For keypoints alone use \"2d_only\"");
+  require(dataset.body_model.empty() || dataset.role == Role::truth, where,
           "\"body_model\" checks the bodies that a file gives, so it needs \"role\": \"truth\"");
-  require(keypoints_3d == "file" || !body_model.empty(), where,
+  require(!dataset.keypoints_3d_of_body || !dataset.body_model.empty(), where,
           "\"keypoints_3d\": \"body\" needs a \"body_model\" to compute them");
-  options.body_model = body_model;
-  options.keypoints_3d_of_body = keypoints_3d == "body";
-  options.root = root;
-  options.annotations = annotations;
-  options.images = images;
-  options.curation = curation;
-  return options;
+  return dataset;
 }
 
 }  // namespace
@@ -129,48 +92,25 @@ LeakageConfig parse_leakage(const json& object, const std::string& where) {
   if (const json* sets = fields.child("test_sets")) {
     leakage.test_sets = parse_datasets(*sets, where + ": test_sets");
   }
-  fields.read("max_distance", leakage.max_distance);
+  read_settings(fields, leakage_settings(), leakage);
   fields.finish();
   require(!leakage.test_sets.empty(), where, "\"test_sets\" must name at least one dataset");
-  require(leakage.max_distance >= 0 && leakage.max_distance <= filters::kMaxHashDistance, where,
-          fmt::format("\"max_distance\" must be 0 to {}", filters::kMaxHashDistance));
   return leakage;
 }
 
-void parse_network(const json& object, const std::string& where, NetworkConfig& network) {
-  std::string checkpoint;
-  std::string asset;
+// Reads an object that has settings alone.
+template <typename Struct>
+void parse_object(const json& object, const std::string& where, const Settings<Struct>& settings,
+                  Struct& config) {
   JsonFields fields(object, where);
-  fields.require("checkpoint", checkpoint);
-  fields.require("smal_asset", asset);
-  fields.read("device", network.device);
-  fields.read("dtype", network.dtype);
-  fields.read("batch", network.batch);
-  fields.read("compute_threads", network.compute_threads);
+  read_settings(fields, settings, config);
   fields.finish();
-  require_one_of(network.dtype, {"float32", "bfloat16"}, where + ": dtype");
-  require(network.batch >= 1, where, fmt::format("\"batch\" must be at least 1, got {}", network.batch));
-  require(network.compute_threads >= 0, where, "\"compute_threads\" must be 0 (all cores) or more");
-  network.checkpoint = checkpoint;
-  network.smal_asset = asset;
 }
 
-void parse_tta(const json& object, const std::string& where, TtaConfig& tta) {
-  JsonFields fields(object, where);
-  fields.read("objective", tta.objective);
-  fields.read("learning_rate", tta.learning_rate);
-  fields.read("aux_weight", tta.aux_weight);
-  fields.read("reproj_weight", tta.reproj_weight);
-  fields.read("iterations_min", tta.iterations_min);
-  fields.read("iterations_max", tta.iterations_max);
-  fields.read("batch", tta.batch);
-  fields.finish();
-  require_one_of(tta.objective, {"paper", "demo"}, where + ": objective");
-  require(tta.learning_rate > 0, where, "\"learning_rate\" must be greater than 0");
-  require(tta.iterations_min >= 1 && tta.iterations_min <= tta.iterations_max, where,
+void check_tta(const TtaConfig& tta, const std::string& where) {
+  require(tta.iterations_min <= tta.iterations_max, where,
           fmt::format("expected 1 <= iterations_min <= iterations_max, got {} and {}", tta.iterations_min,
                       tta.iterations_max));
-  require(tta.batch >= 1, where, "\"batch\" must be at least 1");
 }
 
 void require_both_taus(const std::optional<double>& tau_low, const std::optional<double>& tau_high,
@@ -187,21 +127,15 @@ void parse_dataset_thresholds(const json& object, const std::string& where,
   for (const auto& [name, limits] : object.items()) {
     require_one_of(name, names, where);
     DatasetThresholds& own = filter.datasets[name];
-    JsonFields fields(limits, where + ": " + name);
-    fields.read("tau_low", own.tau_low);
-    fields.read("tau_high", own.tau_high);
-    fields.read("delta", own.delta);
-    fields.finish();
-    require_both_taus(own.tau_low, own.tau_high, fields.where());
+    parse_object(limits, where + ": " + name, dataset_threshold_settings(), own);
+    require_both_taus(own.tau_low, own.tau_high, where + ": " + name);
   }
 }
 
 void parse_filter(const json& object, const std::string& where, const std::vector<std::string>& names,
                   FilterConfig& filter) {
   JsonFields fields(object, where);
-  fields.read("tau_low", filter.tau_low);
-  fields.read("tau_high", filter.tau_high);
-  fields.read("delta", filter.delta);
+  read_settings(fields, filter_settings(), filter);
   if (const json* datasets = fields.child("datasets")) {
     parse_dataset_thresholds(*datasets, where + ": datasets", names, filter);
   }
@@ -209,57 +143,16 @@ void parse_filter(const json& object, const std::string& where, const std::vecto
   require_both_taus(filter.tau_low, filter.tau_high, where);
 }
 
-void parse_guards(const json& object, const std::string& where, GuardConfig& guards) {
-  std::string priors;
-  JsonFields fields(object, where);
-  fields.read("visible_min", guards.visible_min);
-  fields.read("iterations_full_at", guards.iterations_full_at);
-  fields.read("held_out_share", guards.held_out_share);
-  fields.read("held_out_seed", guards.held_out_seed);
-  fields.read("held_out_patience", guards.held_out_patience);
-  fields.read("pose_deviation_max", guards.pose_deviation_max);
-  fields.read("limb_factor_max", guards.limb_factor_max);
-  fields.read("left_right_max", guards.left_right_max);
-  fields.read("mask_iou_min", guards.mask_iou_min);
-  fields.read("priors", priors);
-  fields.finish();
-  guards.priors = priors;
+void check_guards(const GuardConfig& guards, const std::string& where) {
   try {
     filters::check(guards);
   } catch (const std::invalid_argument& error) {
     throw run::ConfigError(where + ": " + error.what());
   }
-  require(guards.iterations_full_at >= 0 && guards.iterations_full_at <= manifests::kNumKeypoints, where,
-          fmt::format("\"iterations_full_at\" must be 0 (off) to 26, got {}", guards.iterations_full_at));
-  require(guards.held_out_share >= 0.0 && guards.held_out_share < 1.0, where,
-          fmt::format("\"held_out_share\" must be 0 (off) or more and less than 1, got {}",
-                      guards.held_out_share));
-  require(guards.held_out_patience >= 0, where, "\"held_out_patience\" must be 0 (no limit) or more");
 }
 
-void parse_shards(const json& object, const std::string& where, ShardConfig& shards) {
-  JsonFields fields(object, where);
-  fields.read("unit_size", shards.unit_size);
-  fields.read("images", shards.images);
-  fields.read("jpeg_quality", shards.jpeg_quality);
-  fields.read("crop_scale", shards.crop_scale);
-  fields.read("crop_min_side_px", shards.crop_min_side_px);
-  fields.finish();
-  require_one_of(shards.images, {"jpeg", "png", "reference"}, where + ": images");
-  require(shards.unit_size >= 1 && shards.unit_size <= 65536, where, "\"unit_size\" must be 1 to 65536");
-  require(shards.jpeg_quality >= 1 && shards.jpeg_quality <= 100, where, "\"jpeg_quality\" must be 1 to 100");
-  require(shards.crop_scale >= 1.0 && shards.crop_scale <= 4.0, where, "\"crop_scale\" must be 1 to 4");
-  require(shards.crop_min_side_px >= 256 && shards.crop_min_side_px <= 2048, where,
-          "\"crop_min_side_px\" must be 256 to 2048");
-}
-
-void parse_calibrate(const json& object, const std::string& where, CalibrateConfig& shares) {
-  JsonFields fields(object, where);
-  fields.read("retained", shares.retained);
-  fields.read("refined", shares.refined);
-  fields.read("per_dataset", shares.per_dataset);
-  fields.finish();
-  require(shares.retained > 0 && shares.refined > 0 && shares.retained + shares.refined < 1, where,
+void check_shares(const CalibrateConfig& shares, const std::string& where) {
+  require(shares.retained + shares.refined < 1, where,
           "the shares must be greater than 0 and their sum less than 1");
 }
 
@@ -292,40 +185,36 @@ std::vector<std::string> names_of(const std::vector<DatasetConfig>& datasets) {
 
 }  // namespace
 
-BuildConfig parse_build_config(const json& merged, const std::string& where) {
-  BuildConfig config;
-  const json expanded = expand_profile(merged, where);
-  JsonFields fields(expanded, where);
-  fields.read("profile", config.profile);
-  fields.read("name", config.name);
-  fields.read("version", config.version);
-  std::string veto;
-  fields.read("veto", veto);
-  config.veto = veto;
-  if (const json* datasets = fields.child("datasets")) {
-    config.datasets = parse_datasets(*datasets, where + ": datasets");
-  }
-  require(!config.datasets.empty(), where, "\"datasets\" must name at least one dataset");
-  if (const json* network = fields.child("network")) {
-    parse_network(*network, where + ": network", config.network);
-  } else {
-    require(!needs_network(config), where,
-            "the key \"network\" is missing; a dataset of role \"pseudo\", the default, gets its labels from "
-            "it. Datasets that bring theirs have the role \"truth\" or \"2d_only\"");
-  }
-  if (const json* tta = fields.child("tta")) parse_tta(*tta, where + ": tta", config.tta);
-  if (const json* leakage = fields.child("leakage")) {
-    config.leakage = parse_leakage(*leakage, where + ": leakage");
-  }
-  if (const json* filter = fields.child("filter")) {
-    parse_filter(*filter, where + ": filter", names_of(config.datasets), config.filter);
-  }
-  if (const json* guards = fields.child("guards")) parse_guards(*guards, where + ": guards", config.guards);
-  if (const json* shards = fields.child("shards")) parse_shards(*shards, where + ": shards", config.shards);
-  if (const json* shares = fields.child("calibrate")) {
-    parse_calibrate(*shares, where + ": calibrate", config.calibrate);
-  }
-  fields.finish();
+namespace {
+
+// The objects below the top level, all but the datasets.
+void parse_parts(JsonFields& fields, const std::string& where, BuildConfig& config) {
+  const auto part = [&](const char* key, auto parse) {
+    if (const json* object = fields.child(key)) parse(*object, where + ": " + key);
+  };
+  part("tta", [&](const json& object, const std::string& name) {
+    parse_object(object, name, tta_settings(), config.tta);
+    check_tta(config.tta, name);
+  });
+  part("leakage",
+       [&](const json& object, const std::string& name) { config.leakage = parse_leakage(object, name); });
+  part("filter", [&](const json& object, const std::string& name) {
+    parse_filter(object, name, names_of(config.datasets), config.filter);
+  });
+  part("guards", [&](const json& object, const std::string& name) {
+    parse_object(object, name, guard_settings(), config.guards);
+    check_guards(config.guards, name);
+  });
+  part("shards", [&](const json& object, const std::string& name) {
+    parse_object(object, name, shard_settings(), config.shards);
+  });
+  part("calibrate", [&](const json& object, const std::string& name) {
+    parse_object(object, name, calibrate_settings(), config.calibrate);
+    check_shares(config.calibrate, name);
+  });
+}
+
+void check_names(const BuildConfig& config, const std::string& where) {
   require(is_plain_name(config.name), where,
           "\"name\" becomes a folder's name: letters, digits, '.', '_' and '-' only");
   require(is_version(config.version), where,
@@ -336,6 +225,29 @@ BuildConfig parse_build_config(const json& merged, const std::string& where) {
             "two datasets have the name and split " + dataset.name + "/" + dataset.split +
                 "; sample ids would not be unique");
   }
+}
+
+}  // namespace
+
+BuildConfig parse_build_config(const json& merged, const std::string& where) {
+  BuildConfig config;
+  const json expanded = expand_profile(merged, where);
+  JsonFields fields(expanded, where);
+  read_settings(fields, build_settings(), config);
+  const json* datasets = fields.child("datasets");
+  const json* network = fields.child("network");
+  if (datasets != nullptr) config.datasets = parse_datasets(*datasets, where + ": datasets");
+  parse_parts(fields, where, config);
+  fields.finish();  // first, so that a misspelt key is named rather than the one that seems to be missing
+  require(!config.datasets.empty(), where, "\"datasets\" must name at least one dataset");
+  if (network != nullptr) {
+    parse_object(*network, where + ": network", network_settings(), config.network);
+  } else {
+    require(!needs_network(config), where,
+            "the key \"network\" is missing; a dataset of role \"pseudo\", the default, gets its labels from "
+            "it. Datasets that bring theirs have the role \"truth\" or \"2d_only\"");
+  }
+  check_names(config, where);
   config.as_written = merged;
   return config;
 }

@@ -33,7 +33,8 @@ struct NetworkConfig {
   std::string device = "auto";       // auto, cpu, cuda, cuda:I
   std::string dtype = "float32";     // float32, bfloat16
   int batch = 8;                     // crops in one forward pass; batches never cross a unit
-  int compute_threads = 0;           // threads of one CPU operator; 0 = as the network's size suggests. Part of the key.
+  int compute_threads =
+      0;  // threads of one CPU operator; 0 = as the network's size suggests. Part of the key.
 };
 
 struct TtaConfig {

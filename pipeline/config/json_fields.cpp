@@ -8,7 +8,6 @@
 #include <numeric>
 
 namespace q3d::pipeline::config {
-namespace {
 
 // Levenshtein distance, one row at a time.
 std::size_t edit_distance(const std::string& a, const std::string& b) {
@@ -26,7 +25,9 @@ std::size_t edit_distance(const std::string& a, const std::string& b) {
   return row.back();
 }
 
-}  // namespace
+bool is_misspelling(const std::string& a, const std::string& b) {
+  return 3 * edit_distance(a, b) <= std::max(a.size(), b.size());
+}
 
 std::string nearest_word(const std::string& word, const std::vector<std::string>& candidates) {
   const auto nearest = std::min_element(
@@ -49,11 +50,23 @@ const nlohmann::json* JsonFields::find(const std::string& key) {
 }
 
 void JsonFields::finish() const {
+  std::string problems;
   for (const auto& [key, value] : object_.items()) {
     if (known_.count(key) != 0) continue;
-    const std::string nearest = nearest_word(key, {known_.begin(), known_.end()});
-    throw run::ConfigError(fmt::format("{}: unknown key \"{}\"; did you mean \"{}\"?", where_, key, nearest));
+    problems += fmt::format("{}unknown key \"{}\"; did you mean \"{}\"?", problems.empty() ? "" : " ", key,
+                            nearest_word(key, {known_.begin(), known_.end()}));
   }
+  if (!problems.empty()) throw run::ConfigError(where_ + ": " + problems);
+}
+
+void JsonFields::fail_missing(const std::string& key) const {
+  std::string hint;
+  for (const auto& [other, value] : object_.items()) {
+    if (other != key && known_.count(other) == 0 && is_misspelling(key, other)) {
+      hint = fmt::format("; \"{}\" is not known: did you mean \"{}\"?", other, key);
+    }
+  }
+  throw run::ConfigError(fmt::format("{}: the key \"{}\" is missing{}", where_, key, hint));
 }
 
 void JsonFields::fail(const std::string& key, const nlohmann::json& json, const char* expected) const {
@@ -65,6 +78,13 @@ void JsonFields::fail(const std::string& key, const nlohmann::json& json, const 
 void JsonFields::assign(const std::string& key, const nlohmann::json& json, std::string& value) const {
   if (!json.is_string()) fail(key, json, "a string");
   value = json.get<std::string>();
+}
+
+void JsonFields::assign(const std::string& key, const nlohmann::json& json,
+                        std::filesystem::path& value) const {
+  std::string text;
+  assign(key, json, text);
+  value = text;
 }
 
 void JsonFields::assign(const std::string& key, const nlohmann::json& json, bool& value) const {

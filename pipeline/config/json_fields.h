@@ -3,6 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include <filesystem>
 #include <optional>
 #include <set>
 #include <string>
@@ -13,8 +14,8 @@
 namespace q3d::pipeline::config {
 
 // Reads the fields of `object`; `where` names it in messages ("config.json: filter"). Fields that are absent
-// keep the caller's default. finish() throws ConfigError for a key that no read() asked for, naming the
-// nearest one.
+// keep the caller's default. finish() throws ConfigError that lists every key that no read() asked for, each
+// with the nearest known one.
 class JsonFields {
  public:
   JsonFields(const nlohmann::json& object, std::string where);
@@ -34,17 +35,20 @@ class JsonFields {
   template <typename T>
   void require(const std::string& key, T& value) {
     const nlohmann::json* found = find(key);
-    if (found == nullptr) throw run::ConfigError(where_ + ": the key \"" + key + "\" is missing");
+    if (found == nullptr) fail_missing(key);
     assign(key, *found, value);
   }
   // The object or array under `key`, or null when it is absent.
   const nlohmann::json* child(const std::string& key) { return find(key); }
   void finish() const;
+  // Throws ConfigError that names the key, and the unknown key that is probably meant to be it.
+  [[noreturn]] void fail_missing(const std::string& key) const;
   const std::string& where() const { return where_; }
 
  private:
   const nlohmann::json* find(const std::string& key);
   void assign(const std::string& key, const nlohmann::json& json, std::string& value) const;
+  void assign(const std::string& key, const nlohmann::json& json, std::filesystem::path& value) const;
   void assign(const std::string& key, const nlohmann::json& json, bool& value) const;
   void assign(const std::string& key, const nlohmann::json& json, int& value) const;
   void assign(const std::string& key, const nlohmann::json& json, std::uint64_t& value) const;
@@ -56,6 +60,11 @@ class JsonFields {
   std::set<std::string> known_;
 };
 
+// Edits (letters added, dropped or replaced) that turn one word into the other.
+std::size_t edit_distance(const std::string& a, const std::string& b);
+// Whether the words are so near that one is probably the other misspelt: a third of the letters differ at
+// most.
+bool is_misspelling(const std::string& a, const std::string& b);
 // The candidate with the least edit distance to `word`; empty when there is none.
 std::string nearest_word(const std::string& word, const std::vector<std::string>& candidates);
 

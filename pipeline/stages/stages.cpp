@@ -9,6 +9,7 @@
 
 #include "manifests/atomic_file.h"
 #include "manifests/shard.h"
+#include "pipeline/config/build_settings.h"
 
 namespace q3d::pipeline::stages {
 namespace {
@@ -65,13 +66,7 @@ json fidelity_parts(const config::JudgingRules& rules) {
 }
 
 json refine_parts(const config::TtaConfig& tta, const config::GuardConfig& guards) {
-  json parts = {{"objective", tta.objective},
-                {"learning_rate", tta.learning_rate},
-                {"aux_weight", tta.aux_weight},
-                {"reproj_weight", tta.reproj_weight},
-                {"iterations_min", tta.iterations_min},
-                {"iterations_max", tta.iterations_max},
-                {"batch", tta.batch}};
+  json parts = config::key_parts(config::tta_settings(), tta, config::DecidedStage::refine);
   if (guards.iterations_full_at > 0) parts["iterations_full_at"] = guards.iterations_full_at;
   if (guards.held_out_share > 0.0) {
     parts["held_out"] = {{"share", guards.held_out_share},
@@ -114,13 +109,11 @@ std::string predict_key(const config::BuildConfig& config, const AssetDigests& a
   if (!config::needs_network(config)) {
     return key_of("predict", kPredictCode, {{"network", nullptr}, {"unit_size", config.shards.unit_size}});
   }
-  return key_of("predict", kPredictCode,
-                {{"checkpoint", assets.checkpoint},
-                 {"smal_asset", assets.smal_asset},
-                 {"device", device_key},
-                 {"dtype", config.network.dtype},
-                 {"batch", config.network.batch},
-                 {"unit_size", config.shards.unit_size}});
+  json parts = config::key_parts(config::network_settings(), config.network, config::DecidedStage::predict);
+  parts.update(config::key_parts(config::shard_settings(), config.shards, config::DecidedStage::predict));
+  parts.update(
+      {{"checkpoint", assets.checkpoint}, {"smal_asset", assets.smal_asset}, {"device", device_key}});
+  return key_of("predict", kPredictCode, std::move(parts));
 }
 
 StageKeys stage_keys(const config::BuildConfig& config, const config::JudgingRules& rules,
@@ -136,13 +129,8 @@ StageKeys stage_keys(const config::BuildConfig& config, const config::JudgingRul
   json refine = judges ? refine_parts(config.tta, config.guards) : json::object();
   refine["fidelity"] = keys.fidelity;
   keys.refine = key_of("refine", kRefineCode, std::move(refine));
-  json shards = {{"refine", keys.refine},
-                 {"schema", manifests::kShardSchema},
-                 {"name", config.name},
-                 {"images", config.shards.images},
-                 {"jpeg_quality", config.shards.jpeg_quality},
-                 {"crop_scale", config.shards.crop_scale},
-                 {"crop_min_side_px", config.shards.crop_min_side_px}};
+  json shards = config::key_parts(config::shard_settings(), config.shards, config::DecidedStage::shards);
+  shards.update({{"refine", keys.refine}, {"schema", manifests::kShardSchema}, {"name", config.name}});
   if (judges && rules.measures_labels()) {
     json measure = measure_parts(config.guards, assets);
     measure["refine"] = keys.refine;

@@ -1,0 +1,81 @@
+#include "pipeline/config/config_schema.h"
+
+#include "pipeline/config/build_settings.h"
+
+namespace q3d::pipeline::config {
+namespace {
+
+using nlohmann::ordered_json;
+
+ordered_json schema_of(const SettingFacts& facts) {
+  ordered_json schema{{"description", facts.description}, {"type", facts.type}};
+  if (!facts.words.empty()) schema["enum"] = facts.words;
+  if (facts.range.least) {
+    schema[facts.range.is_open_below ? "exclusiveMinimum" : "minimum"] = *facts.range.least;
+  }
+  if (facts.range.most)
+    schema[facts.range.is_open_above ? "exclusiveMaximum" : "maximum"] = *facts.range.most;
+  if (!facts.value.is_null()) schema["default"] = facts.value;
+  return schema;
+}
+
+ordered_json object_schema(const std::vector<SettingFacts>& settings) {
+  ordered_json schema{
+      {"type", "object"}, {"properties", ordered_json::object()}, {"additionalProperties", false}};
+  for (const SettingFacts& facts : settings) schema["properties"][facts.key] = schema_of(facts);
+  return schema;
+}
+
+// The same where the keys without a default must be there.
+ordered_json whole_object_schema(const std::vector<SettingFacts>& settings) {
+  ordered_json schema = object_schema(settings);
+  for (const SettingFacts& facts : settings) {
+    if (facts.is_required) schema["required"].push_back(facts.key);
+  }
+  return schema;
+}
+
+ordered_json datasets_schema() {
+  std::vector<SettingFacts> settings = facts_of(dataset_settings());
+  for (SettingFacts facts : facts_of(own_label_settings())) {
+    facts.is_required = false;  // by the format, which the program checks
+    settings.push_back(std::move(facts));
+  }
+  return {{"type", "array"}, {"items", whole_object_schema(settings)}};
+}
+
+ordered_json filter_schema() {
+  ordered_json schema = object_schema(facts_of(filter_settings()));
+  schema["properties"]["datasets"] = {
+      {"description", "thresholds of single datasets, by their name"},
+      {"type", "object"},
+      {"additionalProperties", object_schema(facts_of(dataset_threshold_settings()))}};
+  return schema;
+}
+
+ordered_json leakage_schema() {
+  ordered_json schema = object_schema(facts_of(leakage_settings()));
+  schema["properties"]["test_sets"] = datasets_schema();
+  return schema;
+}
+
+}  // namespace
+
+ordered_json build_config_schema() {
+  ordered_json schema = object_schema(facts_of(build_settings()));
+  ordered_json& properties = schema["properties"];
+  properties["datasets"] = datasets_schema();
+  properties["network"] = object_schema(facts_of(network_settings()));
+  properties["tta"] = object_schema(facts_of(tta_settings()));
+  properties["filter"] = filter_schema();
+  properties["guards"] = object_schema(facts_of(guard_settings()));
+  properties["shards"] = object_schema(facts_of(shard_settings()));
+  properties["leakage"] = leakage_schema();
+  properties["calibrate"] = object_schema(facts_of(calibrate_settings()));
+  ordered_json document{{"$schema", "https://json-schema.org/draft/2020-12/schema"},
+                        {"title", "A build's config of quadruped3d"}};
+  document.update(schema);
+  return document;
+}
+
+}  // namespace q3d::pipeline::config
