@@ -37,15 +37,23 @@ void print_summary(const build::BuildSummary& summary) {
   line("discarded", counts.discarded);
   line("failed", counts.failed);
   for (const auto& [reason, count] : summary.dataset.reasons)
-    fmt::print(stderr, "    {:<22} {}\n", reason, count);
+    fmt::print(stderr, "    {:<22} {}\n", manifests::to_string(reason), count);
   fmt::print(stderr, "  labels    ");
   for (const auto& [kind, count] : summary.dataset.labels) {
-    if (count > 0) fmt::print(stderr, "  {} {}", kind, count);
+    if (count > 0) fmt::print(stderr, "  {} {}", manifests::to_string(kind), count);
   }
   fmt::print(stderr, "\n  {} shards in {}\n", summary.dataset.shards.size(), summary.folder.string());
   fmt::print(stderr, "  all verdicts: {}\n", (summary.folder / "verdicts.csv").string());
   fmt::print(stderr, "next: quadruped3d verify {0}\n      quadruped3d inspect {0} --sheet sheet.png\n",
              summary.folder.string());
+}
+
+// Counts by the enumerators' names.
+template <typename Enum>
+nlohmann::ordered_json to_json(const std::map<Enum, std::int64_t>& counts) {
+  nlohmann::ordered_json object = nlohmann::ordered_json::object();
+  for (const auto& [key, count] : counts) object[std::string(manifests::to_string(key))] = count;
+  return object;
 }
 
 nlohmann::ordered_json to_json(const build::BuildSummary& summary) {
@@ -55,11 +63,11 @@ nlohmann::ordered_json to_json(const build::BuildSummary& summary) {
           {"refined", counts.refined},
           {"discarded", counts.discarded},
           {"failed", counts.failed},
-          {"labels", summary.dataset.labels},
+          {"labels", to_json(summary.dataset.labels)},
           {"shards", summary.dataset.shards.size()},
           {"dataset", summary.folder.string()},
           {"content_id", summary.dataset.content_id},
-          {"reasons", summary.dataset.reasons},
+          {"reasons", to_json(summary.dataset.reasons)},
           {"up_to_date", summary.was_up_to_date},
           {"seconds", summary.seconds}};
 }
