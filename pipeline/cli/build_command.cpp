@@ -8,6 +8,7 @@
 #include "manifests/atomic_file.h"
 #include "pipeline/build/build.h"
 #include "pipeline/cli/commands.h"
+#include "pipeline/cli/options.h"
 #include "pipeline/run/progress.h"
 
 namespace q3d::pipeline::cli {
@@ -86,23 +87,16 @@ config::BuildConfig configured(const Arguments& arguments) {
 Command add_build(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = declare(app, "build");
-  command
-      ->add_option("-c,--config", arguments->configs,
-                   "JSON config file; keys of a later file replace those of an earlier one")
-      ->required()
-      ->check(CLI::ExistingFile);
-  command->add_option("-o,--out", arguments->run.out, "output folder; OUT/latest will be the newest dataset")
+  config_option(*command, arguments->configs)->required();
+  out_option(*command, arguments->run.out, "output folder; OUT/latest will be the newest dataset")
       ->required();
   command
       ->add_option("--veto", arguments->veto,
                    "file with the ids of samples to leave out, one per line; a reason may follow after a tab")
       ->check(CLI::ExistingFile);
-  command
-      ->add_option("-t,--threads", arguments->run.threads,
-                   "number of threads that read and decode pictures (0 = all cores)")
-      ->check(CLI::NonNegativeNumber);
-  command->add_flag("--json", arguments->json, "print a machine-readable summary to stdout");
-  command->add_flag("-q,--quiet", arguments->run.quiet, "do not show progress");
+  threads_option(*command, arguments->run.threads);
+  json_flag(*command, arguments->json);
+  quiet_flag(*command, arguments->run.quiet);
   command->footer(
       "Examples:\n"
       "  quadruped3d build --config configs/sample.json --config out/thresholds.json --out out\n"

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "pipeline/cli/commands.h"
+#include "pipeline/cli/options.h"
 #include "pipeline/config/effective_config.h"
 #include "pipeline/config/profiles.h"
 
@@ -35,10 +36,7 @@ Command add_config(CLI::App& app) {
   command->require_subcommand(1);
   CLI::App* shown = command->add_subcommand(
       "show", "print the config as JSON, with its profile expanded and all defaults filled in");
-  shown
-      ->add_option("-c,--config", arguments->configs,
-                   "JSON config file; keys of a later file replace those of an earlier one")
-      ->check(CLI::ExistingFile);
+  config_option(*shown, arguments->configs);
   const char* const footer =
       "Examples:\n"
       "  quadruped3d config show                                  what each profile stands for\n"

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "pipeline/cli/commands.h"
+#include "pipeline/cli/options.h"
 #include "pipeline/dataset/inspect.h"
 #include "pipeline/report/contact_sheet.h"
 
@@ -34,7 +35,7 @@ Command add_inspect(CLI::App& app) {
   command->add_option("--count", arguments->count, "number of samples on the sheet")
       ->capture_default_str()
       ->check(CLI::Range(1, 400));
-  command->add_flag("--json", arguments->json, "print everything that is known as JSON in one line");
+  json_flag(*command, arguments->json, "print everything that is known as JSON in one line");
   command->footer(
       "Examples:\n"
       "  quadruped3d inspect out\n"
