@@ -126,7 +126,9 @@ ordered_json describe_measures(const filters::LabelMeasures& measures) {
 
 ordered_json describe_verdict(const VerdictRow& row) {
   const manifests::Judgement& judgement = row.judgement;
-  const auto if_judged = [&](int count) { return row.is_judged() ? ordered_json(count) : nullptr; };
+  const auto if_judged = [&](int count) {
+    return row.is_judged() ? ordered_json(count) : ordered_json(nullptr);
+  };
   return {{"verdict", manifests::to_string(judgement.verdict)},
           {"reason", manifests::to_string(judgement.reason)},
           {"detail", judgement.detail},

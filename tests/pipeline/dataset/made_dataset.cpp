@@ -2,6 +2,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include <limits>
+
 #include "manifests/atomic_file.h"
 #include "manifests/digest.h"
 #include "manifests/shard.h"
