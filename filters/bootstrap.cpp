@@ -7,6 +7,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "manifests/uniform.h"
+
 namespace q3d::filters {
 namespace {
 
@@ -84,20 +86,14 @@ class PictureSums {
   std::vector<double> counts_;  // pictures x runs
 };
 
-// Draws a number from 0 to count - 1. The result is the same on every machine, unlike that of the standard's
-// distributions. The bias is below count / 2^53.
-std::size_t draw(std::mt19937_64& random, std::size_t count) {
-  return static_cast<std::size_t>(static_cast<double>(random() >> 11) * 0x1p-53 * static_cast<double>(count));
-}
-
 // Draws pictures and runs, and hands them to `statistic` until it gives a number.
 template <typename Statistic>
 double resample(std::size_t pictures, std::size_t runs, std::mt19937_64& random, const Statistic& statistic) {
   for (;;) {
     std::vector<double> times_drawn(runs, 0.0);
-    for (std::size_t r = 0; r < runs; ++r) times_drawn[draw(random, runs)] += 1.0;
+    for (std::size_t r = 0; r < runs; ++r) times_drawn[manifests::uniform_below(random, runs)] += 1.0;
     std::vector<std::size_t> drawn(pictures);
-    for (std::size_t& picture : drawn) picture = draw(random, pictures);
+    for (std::size_t& picture : drawn) picture = manifests::uniform_below(random, pictures);
     const double value = statistic(drawn, times_drawn);
     if (!std::isnan(value)) return value;
   }

@@ -9,6 +9,8 @@
 #include <string>
 #include <utility>
 
+#include "manifests/uniform.h"
+
 namespace q3d::filters {
 namespace {
 
@@ -29,12 +31,6 @@ double squared_distance(std::span<const double> a, std::span<const double> b) {
   double sum = 0.0;
   for (std::size_t d = 0; d < a.size(); ++d) sum += (a[d] - b[d]) * (a[d] - b[d]);
   return sum;
-}
-
-// Draws a number in [0, 1). The result is the same on every platform, unlike that of the standard's
-// distributions.
-double uniform(std::mt19937_64& random) {
-  return static_cast<double>(random() >> 11) * 0x1p-53;
 }
 
 // Returns the index that `at` (0 .. sum of weights) falls on. An index of weight 0 is never drawn while
@@ -58,7 +54,7 @@ Rows draw_centres(const Rows& points, std::size_t clusters, std::mt19937_64& ran
   for (std::size_t c = 0; c < clusters; ++c) {
     double total = 0.0;
     for (const double weight : weights) total += weight;
-    const auto chosen = points[pick(weights, uniform(random) * total)];
+    const auto chosen = points[pick(weights, manifests::uniform(random) * total)];
     centres.values.insert(centres.values.end(), chosen.begin(), chosen.end());
     for (std::size_t i = 0; i < weights.size(); ++i) {
       const double distance = squared_distance(points[i], chosen);

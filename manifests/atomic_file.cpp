@@ -37,6 +37,15 @@ class RemoveOnFailure {
   bool armed_ = true;
 };
 
+// Makes a complete temporary file durable under its name. After the rename there is no temporary file left to
+// remove, and a guard that removes it does no harm.
+void finish(FileDescriptor& file, const fs::path& temporary, const fs::path& path) {
+  file.sync();
+  file.close();
+  if (::rename(temporary.c_str(), path.c_str()) != 0) throw_errno("rename a finished file to", path);
+  sync_folder(path.parent_path());
+}
+
 }  // namespace
 
 void write_file_atomically(const fs::path& path, std::span<const std::byte> content) {
@@ -44,11 +53,8 @@ void write_file_atomically(const fs::path& path, std::span<const std::byte> cont
   RemoveOnFailure guard(temporary);
   FileDescriptor file(temporary, O_WRONLY | O_CREAT | O_EXCL);
   file.write_all(content);
-  file.sync();
-  file.close();
-  if (::rename(temporary.c_str(), path.c_str()) != 0) throw_errno("rename a finished file to", path);
+  finish(file, temporary, path);
   guard.disarm();
-  sync_folder(path.parent_path());
 }
 
 void write_file_atomically(const fs::path& path, std::string_view content) {
@@ -58,11 +64,8 @@ void write_file_atomically(const fs::path& path, std::string_view content) {
 void commit_file(const fs::path& temporary, const fs::path& path) {
   RemoveOnFailure guard(temporary);
   FileDescriptor file(temporary, O_RDWR);
-  file.sync();
-  file.close();
-  if (::rename(temporary.c_str(), path.c_str()) != 0) throw_errno("rename a finished file to", path);
+  finish(file, temporary, path);
   guard.disarm();
-  sync_folder(path.parent_path());
 }
 
 std::string read_file(const fs::path& path) {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <stdexcept>
 #include <utility>
 
@@ -15,21 +16,28 @@ std::string csv_cell(const std::string& text) {
   return quoted + '"';
 }
 
-bool CsvReader::next(std::vector<std::string>& cells) {
+std::string csv_line(const CsvRow& cells) {
+  if (cells.size() == 1 && cells[0].empty()) return "\"\"\n";
+  std::string line;
+  for (std::size_t i = 0; i < cells.size(); ++i) line += (i == 0 ? "" : ",") + csv_cell(cells[i]);
+  return line + '\n';
+}
+
+bool CsvReader::next(CsvRow& cells) {
   cells.clear();
-  while (at_ < text_.size()) {
-    ++line_;
-    do {
-      cells.push_back(cell());
-    } while (take(','));
-    take('\r');
-    if (at_ < text_.size() && !take('\n')) {
-      fail("text after a closing quote, or a lone CR", "a comma or the line's end");
-    }
-    if (cells.size() > 1 || !cells[0].empty()) return true;
-    cells.clear();
+  while (take_line_end()) ++next_line_;  // empty lines
+  if (at_ >= text_.size()) return false;
+  const std::size_t start = at_;
+  line_ = next_line_;
+  do {
+    cells.push_back(cell());
+  } while (take(','));
+  if (at_ < text_.size() && !take_line_end()) {
+    fail("text after a closing quote, or a lone CR", "a comma or the line's end");
   }
-  return false;
+  next_line_ += static_cast<std::size_t>(std::count(text_.begin() + static_cast<std::ptrdiff_t>(start),
+                                                    text_.begin() + static_cast<std::ptrdiff_t>(at_), '\n'));
+  return true;
 }
 
 void CsvReader::fail(const std::string& got, const std::string& expected) const {
@@ -42,21 +50,58 @@ bool CsvReader::take(char c) {
   return true;
 }
 
+// The end of the text ends a line too, but there is nothing to take. A CR that ends the text counts as CRLF.
+bool CsvReader::take_line_end() {
+  const std::string_view rest = text_.substr(std::min(at_, text_.size()));
+  if (!rest.starts_with('\n') && !rest.starts_with("\r\n") && rest != "\r") return false;
+  at_ += rest.starts_with("\r\n") ? 2 : 1;
+  return true;
+}
+
 std::string CsvReader::cell() {
   if (!take('"')) {
     const std::size_t end = std::min(text_.find_first_of(",\r\n", at_), text_.size());
     const std::size_t start = std::exchange(at_, end);
-    return text_.substr(start, end - start);
+    return std::string(text_.substr(start, end - start));
   }
   std::string quoted;
   while (true) {
     const std::size_t quote = text_.find('"', at_);
-    if (quote == std::string::npos) fail("a quote that is not closed", "its end");
-    quoted.append(text_, at_, quote - at_);
+    if (quote == std::string_view::npos) fail("a quote that is not closed", "its end");
+    quoted.append(text_.substr(at_, quote - at_));
     at_ = quote + 1;
     if (!take('"')) return quoted;
     quoted += '"';
   }
+}
+
+CsvTableReader::CsvTableReader(std::string_view text, std::string where) : lines_(text, std::move(where)) {
+  if (!lines_.next(header_)) lines_.fail("an empty file", "a line that names the columns");
+}
+
+std::size_t CsvTableReader::column(const std::string& name) const {
+  const auto found = std::find(header_.begin(), header_.end(), name);
+  if (found == header_.end()) lines_.fail("no column \"" + name + "\"", "one");
+  return static_cast<std::size_t>(found - header_.begin());
+}
+
+bool CsvTableReader::next() {
+  if (!lines_.next(cells_)) return false;
+  if (cells_.size() != header_.size()) {
+    lines_.fail(fmt::format("{} cells", cells_.size()), std::to_string(header_.size()));
+  }
+  return true;
+}
+
+std::optional<double> CsvTableReader::number(std::size_t column) const {
+  const std::string& text = cell(column);
+  if (text.empty()) return std::nullopt;
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size()) {
+    lines_.fail(fmt::format("\"{}\" for {}", text.substr(0, 40), header_[column]), "a number or nothing");
+  }
+  return value;
 }
 
 }  // namespace q3d::manifests

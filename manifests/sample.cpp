@@ -1,6 +1,7 @@
 #include "manifests/sample.h"
 
 #include "manifests/enum_names.h"
+#include "manifests/enumerators.h"
 
 namespace q3d::manifests {
 namespace {
@@ -62,6 +63,10 @@ std::string_view to_string(Reason reason) {
 
 Reason reason_from_string(std::string_view name) {
   return enum_from_name<Reason>("reason", name, kReasonNames);
+}
+
+std::span<const std::string_view> reason_names() {
+  return kReasonNames;
 }
 
 }  // namespace q3d::manifests

@@ -1,6 +1,7 @@
 #include "manifests/verdict.h"
 
 #include "manifests/enum_names.h"
+#include "manifests/enumerators.h"
 
 namespace q3d::manifests {
 namespace {
@@ -20,12 +21,20 @@ Verdict verdict_from_string(std::string_view name) {
   return enum_from_name<Verdict>("verdict", name, kVerdictNames);
 }
 
+std::span<const std::string_view> verdict_names() {
+  return kVerdictNames;
+}
+
 std::string_view to_string(LabelKind kind) {
   return kLabelKindNames.at(static_cast<std::size_t>(kind));
 }
 
 LabelKind label_kind_from_string(std::string_view name) {
   return enum_from_name<LabelKind>("label kind", name, kLabelKindNames);
+}
+
+std::span<const std::string_view> label_kind_names() {
+  return kLabelKindNames;
 }
 
 }  // namespace q3d::manifests

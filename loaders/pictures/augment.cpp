@@ -6,13 +6,12 @@
 #include <numbers>
 #include <opencv2/core.hpp>
 
+#include "manifests/uniform.h"
+
 namespace q3d::loaders::pictures {
 namespace {
 
-// Draws a uniform number in [0, 1) with 53 bits.
-double uniform(std::mt19937_64& engine) {
-  return static_cast<double>(engine() >> 11) * 0x1.0p-53;
-}
+using manifests::uniform;
 
 double normal(std::mt19937_64& engine) {  // Box-Muller; 1 - u keeps the logarithm finite
   const double radius = std::sqrt(-2.0 * std::log(1.0 - uniform(engine)));

@@ -2,12 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <cstdio>
 #include <thread>
 
 #include "pipeline/leakage/exclusions.h"
 #include "pipeline/network/torch_bodies.h"
 #include "pipeline/network/torch_network.h"
+#include "pipeline/run/log.h"
 
 namespace q3d::pipeline::build {
 namespace {
@@ -40,15 +40,15 @@ Workspace::Workspace(const config::BuildConfig& config, const run::RunOptions& o
       ingest_(candidates::ingest(config, digests_, network::load_body_meshes)) {
   leakage::leave_out(config, digests_, options.out, options.quiet, ingest_);
   if (options_.quiet) return;
-  fmt::print(stderr, "{} candidates in {} units\n", ingest_.candidates.size(), ingest_.units.size());
-  for (const std::string& note : ingest_.notes) fmt::print(stderr, "note: {}\n", note);
+  run::log_info(fmt::format("{} candidates in {} units", ingest_.candidates.size(), ingest_.units.size()));
+  for (const std::string& note : ingest_.notes) run::log_note(note);
 }
 
 device::Network& Workspace::network() {
   if (!network_) {
     network_ = network::load_network(config_.network, config_.tta);
-    if (!network_->device_warning().empty()) fmt::print(stderr, "warning: {}\n", network_->device_warning());
-    if (!options_.quiet) fmt::print(stderr, "network on {}\n", network_->device_description());
+    if (!network_->device_warning().empty()) run::log_warning(network_->device_warning());
+    if (!options_.quiet) run::log_info("network on " + network_->device_description());
   }
   return *network_;
 }

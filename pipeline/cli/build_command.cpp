@@ -8,6 +8,7 @@
 #include "manifests/atomic_file.h"
 #include "pipeline/build/build.h"
 #include "pipeline/cli/commands.h"
+#include "pipeline/cli/options.h"
 #include "pipeline/run/progress.h"
 
 namespace q3d::pipeline::cli {
@@ -37,15 +38,23 @@ void print_summary(const build::BuildSummary& summary) {
   line("discarded", counts.discarded);
   line("failed", counts.failed);
   for (const auto& [reason, count] : summary.dataset.reasons)
-    fmt::print(stderr, "    {:<22} {}\n", reason, count);
+    fmt::print(stderr, "    {:<22} {}\n", manifests::to_string(reason), count);
   fmt::print(stderr, "  labels    ");
   for (const auto& [kind, count] : summary.dataset.labels) {
-    if (count > 0) fmt::print(stderr, "  {} {}", kind, count);
+    if (count > 0) fmt::print(stderr, "  {} {}", manifests::to_string(kind), count);
   }
   fmt::print(stderr, "\n  {} shards in {}\n", summary.dataset.shards.size(), summary.folder.string());
   fmt::print(stderr, "  all verdicts: {}\n", (summary.folder / "verdicts.csv").string());
   fmt::print(stderr, "next: quadruped3d verify {0}\n      quadruped3d inspect {0} --sheet sheet.png\n",
              summary.folder.string());
+}
+
+// Counts by the enumerators' names.
+template <typename Enum>
+nlohmann::ordered_json to_json(const std::map<Enum, std::int64_t>& counts) {
+  nlohmann::ordered_json object = nlohmann::ordered_json::object();
+  for (const auto& [key, count] : counts) object[std::string(manifests::to_string(key))] = count;
+  return object;
 }
 
 nlohmann::ordered_json to_json(const build::BuildSummary& summary) {
@@ -55,11 +64,11 @@ nlohmann::ordered_json to_json(const build::BuildSummary& summary) {
           {"refined", counts.refined},
           {"discarded", counts.discarded},
           {"failed", counts.failed},
-          {"labels", summary.dataset.labels},
+          {"labels", to_json(summary.dataset.labels)},
           {"shards", summary.dataset.shards.size()},
           {"dataset", summary.folder.string()},
           {"content_id", summary.dataset.content_id},
-          {"reasons", summary.dataset.reasons},
+          {"reasons", to_json(summary.dataset.reasons)},
           {"up_to_date", summary.was_up_to_date},
           {"seconds", summary.seconds}};
 }
@@ -78,23 +87,16 @@ config::BuildConfig configured(const Arguments& arguments) {
 Command add_build(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = declare(app, "build");
-  command
-      ->add_option("-c,--config", arguments->configs,
-                   "JSON config file; keys of a later file replace those of an earlier one")
-      ->required()
-      ->check(CLI::ExistingFile);
-  command->add_option("-o,--out", arguments->run.out, "output folder; OUT/latest will be the newest dataset")
+  config_option(*command, arguments->configs)->required();
+  out_option(*command, arguments->run.out, "output folder; OUT/latest will be the newest dataset")
       ->required();
   command
       ->add_option("--veto", arguments->veto,
                    "file with the ids of samples to leave out, one per line; a reason may follow after a tab")
       ->check(CLI::ExistingFile);
-  command
-      ->add_option("-t,--threads", arguments->run.threads,
-                   "number of threads that read and decode pictures (0 = all cores)")
-      ->check(CLI::NonNegativeNumber);
-  command->add_flag("--json", arguments->json, "print a machine-readable summary to stdout");
-  command->add_flag("-q,--quiet", arguments->run.quiet, "do not show progress");
+  threads_option(*command, arguments->run.threads);
+  json_flag(*command, arguments->json);
+  quiet_flag(*command, arguments->run.quiet);
   command->footer(
       "Examples:\n"
       "  quadruped3d build --config configs/sample.json --config out/thresholds.json --out out\n"

@@ -8,6 +8,7 @@
 #include "manifests/atomic_file.h"
 #include "pipeline/build/calibrate_run.h"
 #include "pipeline/cli/commands.h"
+#include "pipeline/cli/options.h"
 #include "pipeline/report/calibration_figure.h"
 #include "pipeline/run/progress.h"
 
@@ -88,25 +89,16 @@ nlohmann::ordered_json to_json(const build::CalibrationSummary& summary) {
 Command add_calibrate(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = declare(app, "calibrate");
-  command
-      ->add_option("-c,--config", arguments->configs,
-                   "JSON config file; keys of a later file replace those of an earlier one")
-      ->required()
-      ->check(CLI::ExistingFile);
-  command
-      ->add_option("-o,--out", arguments->run.out,
-                   "output folder; a later build in it reuses the predictions")
+  config_option(*command, arguments->configs)->required();
+  out_option(*command, arguments->run.out, "output folder; a later build in it reuses the predictions")
       ->required();
   command->add_option("-w,--write", arguments->write,
                       "write the thresholds to this file, which build takes as a second --config");
   command->add_option("-f,--figure", arguments->figure,
                       "write an SVG figure of yield and AUC against the threshold");
-  command
-      ->add_option("-t,--threads", arguments->run.threads,
-                   "number of threads that read and decode pictures (0 = all cores)")
-      ->check(CLI::NonNegativeNumber);
-  command->add_flag("--json", arguments->json, "print a machine-readable summary to stdout");
-  command->add_flag("-q,--quiet", arguments->run.quiet, "do not show progress");
+  threads_option(*command, arguments->run.threads);
+  json_flag(*command, arguments->json);
+  quiet_flag(*command, arguments->run.quiet);
   command->footer(
       "Examples:\n"
       "  quadruped3d calibrate --config my.json --out out --write out/thresholds.json \\\n"

@@ -6,6 +6,7 @@
 
 #include "manifests/atomic_file.h"
 #include "pipeline/cli/commands.h"
+#include "pipeline/cli/options.h"
 #include "pipeline/evaluation/compare.h"
 #include "pipeline/run/errors.h"
 
@@ -64,12 +65,7 @@ Command add_compare(CLI::App& app) {
                       "setting to compare, such as \"prediction\"; needs --after-setting");
   command->add_option("--after-setting", options.after_setting,
                       "setting to compare it with, such as \"TTA 30\"");
-  command->add_option("--resamples", options.bootstrap.resamples, "number of resamples of the bootstrap")
-      ->capture_default_str()
-      ->check(CLI::PositiveNumber);
-  command->add_option("--seed", options.bootstrap.seed, "seed of the bootstrap")->capture_default_str();
-  command->add_option("-o,--out", arguments->out, "write the comparison to this file as JSON");
-  command->add_flag("--json", arguments->json, "print the comparison as JSON to stdout");
+  comparison_options(*command, options.bootstrap, arguments->out, arguments->json);
   command->footer(
       "Examples:\n"
       "  quadruped3d compare --before out/stage1/evaluation --after out/stage3/evaluation\n"

@@ -6,6 +6,7 @@
 
 #include "manifests/atomic_file.h"
 #include "pipeline/cli/commands.h"
+#include "pipeline/cli/options.h"
 #include "pipeline/evaluation/compare_labels.h"
 #include "pipeline/run/errors.h"
 
@@ -62,12 +63,7 @@ Command add_compare_labels(CLI::App& app) {
                    "the same number of folders, of builds over the same pools, in the same order")
       ->required()
       ->check(CLI::ExistingDirectory);
-  command->add_option("--resamples", arguments->bootstrap.resamples, "number of resamples of the bootstrap")
-      ->capture_default_str()
-      ->check(CLI::PositiveNumber);
-  command->add_option("--seed", arguments->bootstrap.seed, "seed of the bootstrap")->capture_default_str();
-  command->add_option("-o,--out", arguments->out, "write the comparison to this file as JSON");
-  command->add_flag("--json", arguments->json, "print the comparison as JSON to stdout");
+  comparison_options(*command, arguments->bootstrap, arguments->out, arguments->json);
   command->footer(
       "Examples:\n"
       "  quadruped3d compare-labels --before out/paper_labels --after out/strict_labels\n"

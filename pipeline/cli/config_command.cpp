@@ -5,6 +5,7 @@
 
 #include "manifests/atomic_file.h"
 #include "pipeline/cli/commands.h"
+#include "pipeline/cli/options.h"
 #include "pipeline/config/config_schema.h"
 #include "pipeline/config/effective_config.h"
 #include "pipeline/config/profiles.h"
@@ -55,10 +56,7 @@ int make_tables(const Arguments& arguments) {
 CLI::App* add_show(CLI::App& command, Arguments& arguments) {
   CLI::App* shown = command.add_subcommand(
       "show", "print the config as JSON, with its profile expanded and all defaults filled in");
-  shown
-      ->add_option("-c,--config", arguments.configs,
-                   "JSON config file; keys of a later file replace those of an earlier one")
-      ->check(CLI::ExistingFile);
+  config_option(*shown, arguments.configs);
   return shown;
 }
 

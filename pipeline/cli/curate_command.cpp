@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "pipeline/cli/commands.h"
+#include "pipeline/cli/options.h"
 #include "pipeline/curation/curate_run.h"
 
 namespace q3d::pipeline::cli {
@@ -54,13 +55,11 @@ void print_summary(const curation::CurationSummary& summary) {
 Command add_curate(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = declare(app, "curate");
-  command
-      ->add_option("-c,--config", arguments->configs,
-                   "JSON file with the rule; keys of a later file replace those of an earlier one")
-      ->required()
-      ->check(CLI::ExistingFile);
-  command->add_option("-o,--out", arguments->out, "folder for the list")->required();
-  command->add_flag("--json", arguments->json, "print a machine-readable summary to stdout");
+  config_option(*command, arguments->configs,
+                "JSON file with the rule; keys of a later file replace those of an earlier one")
+      ->required();
+  out_option(*command, arguments->out, "folder for the list")->required();
+  json_flag(*command, arguments->json);
   command->footer(
       "Examples:\n"
       "  quadruped3d curate --config configs/quadruped2d.json --out out/curation\n"

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "pipeline/cli/commands.h"
+#include "pipeline/cli/options.h"
 #include "pipeline/evaluation/report.h"
 #include "pipeline/run/progress.h"
 
@@ -68,25 +69,17 @@ void add_settings(CLI::App& command, evaluation::EvaluationOptions& options) {
 Command add_evaluate(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = declare(app, "evaluate");
-  command
-      ->add_option("-c,--config", arguments->configs,
-                   "JSON config file; keys of a later file replace those of an earlier one")
-      ->required()
-      ->check(CLI::ExistingFile);
+  config_option(*command, arguments->configs)->required();
   command
       ->add_option("--checkpoint", arguments->checkpoint,
                    "weights to measure, instead of the config's network.checkpoint")
       ->check(CLI::ExistingFile);
-  command->add_option("-o,--out", arguments->out, "folder for evaluation.json, samples.csv and tables.csv")
-      ->required();
+  out_option(*command, arguments->out, "folder for evaluation.json, samples.csv and tables.csv")->required();
   add_settings(*command, arguments->options);
   command->add_flag("--species", arguments->species, "also show the table by species");
-  command
-      ->add_option("-t,--threads", arguments->options.threads,
-                   "number of threads that read and decode pictures (0 = all cores)")
-      ->check(CLI::NonNegativeNumber);
-  command->add_flag("--json", arguments->json, "print evaluation.json to stdout");
-  command->add_flag("-q,--quiet", arguments->options.quiet, "do not show progress");
+  threads_option(*command, arguments->options.threads);
+  json_flag(*command, arguments->json, "print evaluation.json to stdout");
+  quiet_flag(*command, arguments->options.quiet);
   command->footer(
       "Examples:\n"
       "  quadruped3d evaluate --config configs/world_evaluation.json \\\n"

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "pipeline/cli/commands.h"
+#include "pipeline/cli/options.h"
 #include "pipeline/evaluation/labels.h"
 
 namespace q3d::pipeline::cli {
@@ -35,10 +36,8 @@ Command add_evaluate_labels(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   evaluation::LabelOptions& options = arguments->options;
   CLI::App* command = declare(app, "evaluate-labels");
-  command->add_option("-c,--config", arguments->configs, "the build's config, thresholds included")
-      ->required()
-      ->check(CLI::ExistingFile);
-  command->add_option("-o,--out", options.run.out, "the build's output folder")
+  config_option(*command, arguments->configs, "the build's config, thresholds included")->required();
+  out_option(*command, options.run.out, "the build's output folder")
       ->required()
       ->check(CLI::ExistingDirectory);
   command->add_option("--truth", options.truth, "file with the hidden truth of the pool's pictures")
@@ -46,12 +45,9 @@ Command add_evaluate_labels(CLI::App& app) {
   command->add_option("--masks", options.masks, "folder that the truth's mask paths start from")
       ->check(CLI::ExistingDirectory);
   command->add_option("--report", arguments->report, "folder for labels.json and labels.csv");
-  command
-      ->add_option("-t,--threads", options.run.threads,
-                   "number of threads that read and decode pictures (0 = all cores)")
-      ->check(CLI::NonNegativeNumber);
-  command->add_flag("--json", arguments->json, "print labels.json to stdout");
-  command->add_flag("-q,--quiet", options.run.quiet, "do not show progress");
+  threads_option(*command, options.run.threads);
+  json_flag(*command, arguments->json, "print labels.json to stdout");
+  quiet_flag(*command, options.run.quiet);
   command->footer(
       "Example:\n"
       "  quadruped3d evaluate-labels --config configs/world_stage2.json --config out/thresholds.json \\\n"

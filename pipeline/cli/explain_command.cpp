@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "pipeline/cli/commands.h"
+#include "pipeline/cli/options.h"
 #include "pipeline/dataset/explain.h"
 
 namespace q3d::pipeline::cli {
@@ -28,7 +29,7 @@ Command add_explain(CLI::App& app) {
       ->add_option("sample", arguments->sample,
                    "the id of the sample, as in the first column of verdicts.csv")
       ->required();
-  command->add_flag("--json", arguments->json, "print the result as JSON");
+  json_flag(*command, arguments->json, "print the result as JSON");
   command->footer(
       "Examples:\n"
       "  quadruped3d explain out 'superanimal/train/images/wolf_1.jpg#12'\n"

@@ -7,6 +7,7 @@
 
 #include "pipeline/animal/synthetic_files.h"
 #include "pipeline/cli/commands.h"
+#include "pipeline/cli/options.h"
 #include "pipeline/network/torch_network.h"
 #include "pipeline/run/errors.h"
 
@@ -27,7 +28,7 @@ struct Arguments {
 Command add_init(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = declare(app, "init");
-  command->add_option("-o,--out", arguments->out, "write an untrained checkpoint to this file (safetensors)");
+  out_option(*command, arguments->out, "write an untrained checkpoint to this file (safetensors)");
   command->add_option("-s,--size", arguments->size, "size of the network: vith (the paper's), small or tiny")
       ->capture_default_str();
   command->add_option("--seed", arguments->seed, "the same seed gives the same bytes")->capture_default_str();
@@ -35,7 +36,7 @@ Command add_init(CLI::App& app) {
                       "write the synthetic quadruped, a body model with SMAL's dimensions, to this file");
   command->add_option("--priors", arguments->priors,
                       "write the synthetic quadruped's pose and shape priors, for training, to this file");
-  command->add_flag("--json", arguments->json, "print a machine-readable summary to stdout");
+  json_flag(*command, arguments->json);
   command->footer(
       "Examples:\n"
       "  quadruped3d init --size small --out data/small.safetensors \\\n"

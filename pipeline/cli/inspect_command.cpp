@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "pipeline/cli/commands.h"
+#include "pipeline/cli/options.h"
 #include "pipeline/dataset/inspect.h"
 #include "pipeline/report/contact_sheet.h"
 
@@ -28,13 +29,13 @@ Command add_inspect(CLI::App& app) {
   command->add_option("path", arguments->path, "a dataset's folder, an output folder, or one shard")
       ->required()
       ->check(CLI::ExistingPath);
-  command->add_option("--sample", arguments->sample, "print everything about the sample with this id");
+  command->add_option("--sample", arguments->sample, "describe the sample with this id");
   command->add_option("--sheet", arguments->sheet,
                       "write a PNG that shows crops with annotated and projected keypoints");
   command->add_option("--count", arguments->count, "number of samples on the sheet")
       ->capture_default_str()
       ->check(CLI::Range(1, 400));
-  command->add_flag("--json", arguments->json, "print the description as JSON in one line");
+  json_flag(*command, arguments->json, "print everything that is known as JSON in one line");
   command->footer(
       "Examples:\n"
       "  quadruped3d inspect out\n"
@@ -49,10 +50,16 @@ Command add_inspect(CLI::App& app) {
       fmt::print(stderr, "wrote {}\n", arguments->sheet.string());
       return 0;
     }
-    const nlohmann::ordered_json document =
-        arguments->sample.empty() ? dataset::describe(arguments->path)
-                                  : dataset::describe_sample(arguments->path, arguments->sample);
-    fmt::print("{}\n", document.dump(arguments->json ? -1 : 2));
+    const bool is_whole = arguments->sample.empty();
+    if (arguments->json) {
+      const nlohmann::ordered_json document =
+          is_whole ? dataset::describe(arguments->path)
+                   : dataset::describe_sample(arguments->path, arguments->sample);
+      fmt::print("{}\n", document.dump());
+    } else {
+      fmt::print("{}", is_whole ? dataset::page(arguments->path)
+                                : dataset::sample_page(arguments->path, arguments->sample));
+    }
     return 0;
   };
 }

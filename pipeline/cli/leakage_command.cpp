@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "pipeline/cli/commands.h"
+#include "pipeline/cli/options.h"
 #include "pipeline/leakage/leakage_run.h"
 #include "pipeline/run/progress.h"
 
@@ -52,21 +53,12 @@ void print_summary(const leakage::LeakageRunSummary& summary, const std::filesys
 Command add_leakage(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = declare(app, "leakage");
-  command
-      ->add_option("-c,--config", arguments->configs,
-                   "JSON config file; keys of a later file replace those of an earlier one")
-      ->required()
-      ->check(CLI::ExistingFile);
-  command
-      ->add_option("-o,--out", arguments->run.out,
-                   "folder for the lists, the HTML page and the cache of hashes")
+  config_option(*command, arguments->configs)->required();
+  out_option(*command, arguments->run.out, "folder for the lists, the HTML page and the cache of hashes")
       ->required();
-  command
-      ->add_option("-t,--threads", arguments->run.threads,
-                   "number of threads that read and decode pictures (0 = all cores)")
-      ->check(CLI::NonNegativeNumber);
-  command->add_flag("--json", arguments->json, "print a machine-readable summary to stdout");
-  command->add_flag("-q,--quiet", arguments->run.quiet, "do not show progress");
+  threads_option(*command, arguments->run.threads);
+  json_flag(*command, arguments->json);
+  quiet_flag(*command, arguments->run.quiet);
   command->footer(
       "Examples:\n"
       "  quadruped3d leakage --config my.json --out out\n"

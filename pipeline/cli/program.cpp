@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "pipeline/cli/stderr_log.h"
 #include "pipeline/run/errors.h"
 #include "pipeline/run/interrupt.h"
 #include "pipeline/run/version.h"
@@ -79,6 +80,8 @@ CLI::App* declare(CLI::App& app, std::string_view name) {
 int run_program(int argc, char** argv, std::span<const CommandEntry> entries) {
   cv::setNumThreads(1);  // the flow graph's threads are the only ones
   run::install_interrupt_handlers();
+  StderrLog log;
+  const run::LogTo to_stderr(log);
   try {
     return parse_and_run(argc, argv, entries);
   } catch (const run::Interrupted&) {

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "pipeline/cli/commands.h"
+#include "pipeline/cli/options.h"
 #include "pipeline/run/interrupt.h"
 #include "pipeline/run/progress.h"
 #include "pipeline/world/world.h"
@@ -25,18 +26,16 @@ Command add_sample(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   world::WorldOptions& options = arguments->world;
   CLI::App* command = declare(app, "sample");
-  command->add_option("-o,--out", options.out, "folder to create")->required();
+  out_option(*command, options.out, "folder to create")->required();
   command->add_option("--seed", options.seed, "the same seed gives the same bytes")->capture_default_str();
   command->add_option("--share", options.share, "share of the default number of pictures to render")
       ->capture_default_str();
   command->add_option("--pixels", options.picture_px, "longer side of a photograph, in pixels")
       ->capture_default_str();
-  command
-      ->add_option("-t,--threads", options.threads,
-                   "number of threads (0 = all cores); it does not change the result")
-      ->capture_default_str();
-  command->add_flag("--json", arguments->json, "print a machine-readable summary to stdout");
-  command->add_flag("-q,--quiet", arguments->quiet, "do not show progress");
+  threads_option(*command, options.threads,
+                 "number of threads (0 = all cores); it does not change the result");
+  json_flag(*command, arguments->json);
+  quiet_flag(*command, arguments->quiet);
   command->footer(
       "Examples:\n"
       "  quadruped3d sample --out data/world --share 0.08     a few hundred pictures\n"

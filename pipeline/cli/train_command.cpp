@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/cli/commands.h"
+#include "pipeline/cli/options.h"
 #include "pipeline/run/progress.h"
 #include "pipeline/training/training_run.h"
 
@@ -40,25 +41,18 @@ nlohmann::ordered_json to_json(const training::TrainingSummary& summary) {
 Command add_train(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = declare(app, "train");
-  command
-      ->add_option("-c,--config", arguments->configs,
-                   "JSON config file; keys of a later file replace those of an earlier one")
-      ->required()
-      ->check(CLI::ExistingFile);
+  config_option(*command, arguments->configs)->required();
   command->add_option("-s,--stage", arguments->stage, "name of the stage in the config, such as 1 or 3")
       ->required();
-  command->add_option("-o,--out", arguments->options.out, "folder of this run, for state, log and weights")
-      ->required();
-  command
-      ->add_option("-t,--threads", arguments->options.threads,
-                   "number of threads that prepare batches (0 = all cores)")
-      ->check(CLI::NonNegativeNumber);
+  out_option(*command, arguments->options.out, "folder of this run, for state, log and weights")->required();
+  threads_option(*command, arguments->options.threads,
+                 "number of threads that prepare batches (0 = all cores)");
   command
       ->add_option("--max-steps", arguments->options.max_steps,
                    "save and stop after this many steps (0 = train to the end)")
       ->check(CLI::NonNegativeNumber);
-  command->add_flag("--json", arguments->json, "print a machine-readable summary to stdout");
-  command->add_flag("-q,--quiet", arguments->options.quiet, "do not show progress");
+  json_flag(*command, arguments->json);
+  quiet_flag(*command, arguments->options.quiet);
   command->footer(
       "Examples:\n"
       "  quadruped3d train --config configs/world_training.json --stage 1 --out out/stage1\n"

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "pipeline/cli/commands.h"
+#include "pipeline/cli/options.h"
 #include "pipeline/dataset/verify.h"
 
 namespace q3d::pipeline::cli {
@@ -27,8 +28,8 @@ Command add_verify(CLI::App& app) {
                    "a dataset's folder, or an output folder (its newest dataset is checked)")
       ->required()
       ->check(CLI::ExistingDirectory);
-  command->add_flag("--json", arguments->json, "print a machine-readable summary to stdout");
-  command->add_flag("-q,--quiet", arguments->quiet, "do not show progress");
+  json_flag(*command, arguments->json);
+  quiet_flag(*command, arguments->quiet);
   command->footer(
       "Examples:\n"
       "  quadruped3d verify out\n"

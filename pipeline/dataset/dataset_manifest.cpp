@@ -5,10 +5,10 @@
 #include <nlohmann/json.hpp>
 
 #include <cmath>
-#include <stdexcept>
 
-#include "manifests/atomic_file.h"
 #include "manifests/csv.h"
+#include "manifests/digest.h"
+#include "manifests/enumerators.h"
 #include "manifests/shard.h"
 #include "pipeline/config/effective_config.h"
 #include "pipeline/run/version.h"
@@ -18,7 +18,6 @@ namespace {
 
 using manifests::csv_cell;
 using manifests::Verdict;
-using nlohmann::json;
 using nlohmann::ordered_json;
 
 ordered_json to_json(const Counts& counts) {
@@ -29,17 +28,13 @@ ordered_json to_json(const Counts& counts) {
           {"failed", counts.failed}};
 }
 
-bool is_kept(const manifests::Judgement& judgement) {
-  return judgement.verdict == Verdict::retained || judgement.verdict == Verdict::refined;
-}
-
 // Counts and mean errors by any label of the candidates.
 class Statistics {
  public:
   void add(const std::string& label, const manifests::Judgement& judgement) {
     Group& group = groups_[label.empty() ? "unknown" : label];
     group.counts.add(judgement.verdict);
-    if (is_kept(judgement)) {
+    if (manifests::is_kept(judgement.verdict)) {
       group.initial.add(judgement.initial_error);
       group.final.add(judgement.final_error);
     }
@@ -107,7 +102,7 @@ ordered_json count_labels(const candidates::Ingest& ingest,
        {LabelKind::truth, LabelKind::retained, LabelKind::refined, LabelKind::two_d_only}) {
     std::int64_t count = 0;
     for (std::size_t i = 0; i < judgements.size(); ++i) {
-      count += is_kept(judgements[i]) &&
+      count += manifests::is_kept(judgements[i].verdict) &&
                config::label_kind(ingest.candidates[i].role, judgements[i].verdict) == kind;
     }
     labels[std::string(manifests::to_string(kind))] = count;
@@ -242,7 +237,7 @@ std::string verdicts_csv(const candidates::Ingest& ingest,
     for (std::size_t i = unit.first; i < unit.first + unit.count; ++i) {
       const manifests::SampleRecord& record = ingest.candidates[i].record;
       const manifests::Judgement& judgement = judgements[i];
-      const bool kept = is_kept(judgement);
+      const bool kept = manifests::is_kept(judgement.verdict);
       const bool judged = !std::isnan(judgement.initial_error);
       text += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", csv_cell(record.id),
                           manifests::to_string(judgement.verdict), manifests::to_string(judgement.reason),
@@ -257,56 +252,6 @@ std::string verdicts_csv(const candidates::Ingest& ingest,
     }
   }
   return text;
-}
-
-std::filesystem::path dataset_folder(const std::filesystem::path& given) {
-  for (const auto& folder : {given, given / "latest"}) {
-    if (std::filesystem::exists(folder / "dataset.json")) return folder;
-  }
-  throw std::runtime_error(
-      fmt::format("{}: expected a dataset folder (with dataset.json) or an output folder of "
-                  "`build` (with latest/dataset.json)",
-                  given.string()));
-}
-
-DatasetManifest read_dataset_manifest(const std::filesystem::path& given) {
-  const std::filesystem::path file = dataset_folder(given) / "dataset.json";
-  try {
-    const json document = json::parse(manifests::read_file(file));
-    if (document.at("format") != kDatasetFormat) {
-      throw std::runtime_error(
-          fmt::format("format is {}, expected {}", document.at("format").dump(), kDatasetFormat));
-    }
-    DatasetManifest manifest;
-    manifest.schema = document.at("schema").get<int>();
-    if (manifest.schema != manifests::kShardSchema) {
-      throw std::runtime_error(
-          fmt::format("schema is {}, this toolkit reads {}; use the toolkit version that wrote it "
-                      "({})",
-                      manifest.schema, manifests::kShardSchema, document.value("toolkit", "?")));
-    }
-    manifest.name = document.at("name").get<std::string>();
-    manifest.version = document.at("version").get<std::string>();
-    manifest.key = document.at("key").get<std::string>();
-    manifest.content_id = document.at("content_id").get<std::string>();
-    const json& counts = document.at("counts");
-    manifest.counts = {counts.at("candidates").get<std::int64_t>(), counts.at("retained").get<std::int64_t>(),
-                       counts.at("refined").get<std::int64_t>(), counts.at("discarded").get<std::int64_t>(),
-                       counts.at("failed").get<std::int64_t>()};
-    manifest.labels = document.at("labels").get<std::map<std::string, std::int64_t>>();
-    manifest.verdicts_sha256 = document.at("verdicts").at("sha256").get<std::string>();
-    manifest.reasons = document.at("statistics").at("reasons").get<std::map<std::string, std::int64_t>>();
-    for (const json& shard : document.at("shards")) {
-      manifest.shards.push_back({shard.at("file").get<std::string>(), shard.at("sha256").get<std::string>(),
-                                 shard.at("bytes").get<std::int64_t>(), shard.at("rows").get<std::int64_t>(),
-                                 shard.at("unit").get<std::int64_t>()});
-    }
-    return manifest;
-  } catch (const json::exception& error) {
-    throw std::runtime_error(fmt::format("{}: not a readable dataset.json: {}", file.string(), error.what()));
-  } catch (const std::runtime_error& error) {
-    throw std::runtime_error(fmt::format("{}: {}", file.string(), error.what()));
-  }
 }
 
 }  // namespace q3d::pipeline::dataset

@@ -5,9 +5,11 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "filters/fidelity.h"
 #include "manifests/verdict.h"
 #include "pipeline/candidates/ingest.h"
 #include "pipeline/config/build_config.h"
@@ -32,6 +34,16 @@ struct Counts {
   std::int64_t discarded = 0;
   std::int64_t failed = 0;
   void add(manifests::Verdict verdict);
+  bool operator==(const Counts&) const = default;
+};
+
+// The candidates of one group: of one dataset, family or species, or all of them.
+struct GroupStatistics {
+  Counts counts;
+  // Mean L_proj of the kept ones before and after refinement, in crop units (crop side = 1); absent where it
+  // was computed for none of them.
+  std::optional<double> mean_initial_error;
+  std::optional<double> mean_final_error;
 };
 
 // What a reader needs of dataset.json.
@@ -40,12 +52,25 @@ struct DatasetManifest {
   std::string version;
   std::string key;         // 64 hex digits: the config, the code, the assets and the pictures
   std::string content_id;  // SHA-256 over the ordered shard digests
+  std::string toolkit;     // version of the toolkit that wrote it
+  std::string profile;
   int schema = 0;
   Counts counts;
-  std::map<std::string, std::int64_t> labels;  // kept samples by kind of label: truth, retained, ...
+  std::map<manifests::LabelKind, std::int64_t> labels;  // kept samples by kind of label
+  std::map<manifests::Reason, std::int64_t> reasons;    // of the discarded and the failed
+  GroupStatistics all;
+  std::map<std::string, GroupStatistics> by_dataset;  // by "name/split"
+  std::map<manifests::Family, GroupStatistics> by_family;
+  std::map<std::string, GroupStatistics> by_species;        // "unknown" where the file names none
+  std::map<std::string, filters::Thresholds> thresholds;    // by dataset, of those with pseudo labels
+  std::map<std::string, config::Role> roles;                // by "name/split"
+  std::size_t unit_size = config::ShardConfig{}.unit_size;  // candidates of one unit, and so of one shard
+  stages::StageKeys keys;                                   // `measure` is empty when no bound was on
+  std::string checkpoint_sha256;                            // empty, like the two below, without a network
+  std::string smal_asset_sha256;
+  std::string device;
   std::vector<ShardEntry> shards;
   std::string verdicts_sha256;
-  std::map<std::string, std::int64_t> reasons;  // of the discarded and the failed
 };
 
 // SHA-256 over the shards' digests, one a line, in unit order.
@@ -70,7 +95,8 @@ std::string verdicts_csv(const candidates::Ingest& ingest,
                          const std::vector<manifests::Judgement>& judgements);
 
 // Reads dataset.json of a dataset's folder, or of the newest one (`latest`) of an output folder.
-// Throws std::runtime_error naming file, key, got and expected.
+// Throws std::runtime_error that names the file, what was found and what was expected; a name that is no
+// enumerator's counts as damage.
 DatasetManifest read_dataset_manifest(const std::filesystem::path& folder);
 // The folder itself, or its `latest`. Throws std::runtime_error when neither holds a dataset.json.
 std::filesystem::path dataset_folder(const std::filesystem::path& given);

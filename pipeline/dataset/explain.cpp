@@ -5,40 +5,24 @@
 #include <nlohmann/json.hpp>
 
 #include <cmath>
-#include <map>
 #include <optional>
-#include <set>
 #include <stdexcept>
 
 #include "loaders/keypoints/topology.h"
 #include "loaders/pictures/crop.h"
-#include "manifests/atomic_file.h"
-#include "manifests/csv.h"
-#include "manifests/shard.h"
-#include "pipeline/config/json_fields.h"
-#include "pipeline/dataset/dataset_manifest.h"
-#include "pipeline/stages/stage_store.h"
+#include "pipeline/dataset/published_dataset.h"
+#include "pipeline/dataset/sentences.h"
 #include "pipeline/unit/crop_keypoints.h"
-#include "pipeline/unit/unit_tables.h"
 
 namespace q3d::pipeline::dataset {
 namespace {
 
 namespace fs = std::filesystem;
-using nlohmann::json;
 using nlohmann::ordered_json;
 
 using Projection = std::array<float, manifests::kNumKeypoints * 2>;  // crop units
 
-// The candidate's line of verdicts.csv, by column, and its place in ingest order.
-struct VerdictLine {
-  std::map<std::string, std::string> cells;
-  std::size_t position = 0;
-
-  const std::string& at(const char* column) const { return cells.at(column); }
-};
-
-// What is known of the candidate besides its verdict's line.
+// What is known of the candidate besides its row of verdicts.csv.
 struct Evidence {
   manifests::SampleRecord record;  // id, image_ref, box and keypoints
   std::optional<Projection> before;
@@ -49,95 +33,52 @@ struct Evidence {
   std::vector<std::string> missing;
 };
 
-[[noreturn]] void no_such_id(const std::string& id, const std::vector<std::string>& near,
-                             const fs::path& file) {
-  const std::string nearest = config::nearest_word(id, near);
-  throw std::runtime_error(fmt::format("{}: no candidate {}{}", file.string(), id,
-                                       nearest.empty() ? "" : fmt::format("; the nearest is {}", nearest)));
-}
-
-VerdictLine find_line(const fs::path& file, const std::string& id) {
-  const std::string text = manifests::read_file(file);
-  manifests::CsvReader lines(text, file.string());
-  std::vector<std::string> header;
-  std::vector<std::string> cells;
-  std::vector<std::string> near;  // ids that share the picture's last part, or the first few
-  lines.next(header);
-  const std::string part = id.substr(id.rfind('/') + 1);
-  for (std::size_t position = 0; lines.next(cells); ++position) {
-    if (cells.size() != header.size()) {
-      lines.fail(fmt::format("{} cells", cells.size()), std::to_string(header.size()));
-    }
-    if (cells[0] == id) {
-      VerdictLine line;
-      for (std::size_t i = 0; i < header.size(); ++i) line.cells[header[i]] = cells[i];
-      line.position = position;
-      return line;
-    }
-    const bool is_near = cells[0].find(part.substr(0, part.find('#'))) != std::string::npos;
-    if (near.size() < 1000 && (is_near || near.size() < 10)) near.push_back(cells[0]);
-  }
-  no_such_id(id, near, file);
-}
-
-ordered_json number_or_null(const std::string& cell) {
-  return cell.empty() ? ordered_json(nullptr) : ordered_json(std::stod(cell));
-}
-
 ordered_json number_or_null(double value) {
   return std::isfinite(value) ? ordered_json(value) : ordered_json(nullptr);
 }
 
-// The stage's table of the candidate's unit, if it is still there.
-std::optional<manifests::Table> stage_table(const fs::path& folder, const json& dataset, const char* stage,
-                                            std::int64_t unit) {
-  const std::string key = dataset.at("provenance").at("stage_keys").at(stage).get<std::string>();
-  // <out>/<name>-<key> lies beside <out>/stages; `latest` leads there too.
-  const fs::path file =
-      stages::unit_file(stages::stage_folder(fs::canonical(folder).parent_path(), stage, key), unit);
-  if (!fs::exists(file)) return std::nullopt;
-  return manifests::read_table(file);
-}
-
-void read_stages(const fs::path& folder, const json& dataset, const VerdictLine& line, Evidence& evidence) {
-  const json shards = dataset.at("provenance").at("config").value("shards", json::object());
-  const auto unit_size = static_cast<std::size_t>(shards.value("unit_size", config::ShardConfig{}.unit_size));
-  const auto unit = static_cast<std::int64_t>(line.position / unit_size);
-  const std::size_t row = line.position % unit_size;
-  const auto predicted = stage_table(folder, dataset, "predict", unit);
-  const bool is_there = predicted && row < static_cast<std::size_t>(predicted->rows) &&
-                        unit::candidate_from_table(*predicted, row).id == line.at("id");
-  if (!is_there) {
+// What the stages' tables hold of the candidate. Leaves the evidence without an id if they do not hold it.
+void read_stages(const PublishedDataset& dataset, const VerdictRow& row, Evidence& evidence) {
+  const std::int64_t unit = dataset.unit_of(row);
+  const std::size_t place = dataset.place_in_unit(row);
+  const auto predicted = dataset.predictions(unit);
+  if (!predicted || place >= predicted->candidates.size() || predicted->candidates[place].id != row.id) {
     evidence.missing.emplace_back(
         "predictions: the stage's folder is gone, or was made anew for other candidates");
     return;
   }
-  evidence.record = unit::candidate_from_table(*predicted, row);
-  const unit::PredictedSample sample = unit::predicted_from_table(*predicted)[row];
+  evidence.record = predicted->candidates[place];
+  const unit::PredictedSample& sample = predicted->samples[place];
   if (sample.failure == manifests::Reason::none) evidence.before = sample.body.keypoints_2d;
-  const auto refined = stage_table(folder, dataset, "refine", unit);
-  if (!refined) return;
-  for (unit::RefinedSample& each : unit::refined_from_table(*refined)) {
-    if (each.sample != row) continue;
-    evidence.curve = std::move(each.curve);
-    evidence.held_out_curve = std::move(each.held_out_curve);
-    evidence.after = each.body.keypoints_2d;
+  if (auto refined = dataset.refinements(unit)) {
+    for (unit::RefinedSample& each : *refined) {
+      if (each.sample != place) continue;
+      evidence.curve = std::move(each.curve);
+      evidence.held_out_curve = std::move(each.held_out_curve);
+      evidence.after = each.body.keypoints_2d;
+    }
   }
-  if (dataset.at("provenance").at("stage_keys").at("measure").is_null()) return;
-  const auto measured = stage_table(folder, dataset, "measure", unit);
-  if (!measured) return;
-  for (const unit::MeasuredLabel& each : unit::measured_from_table(*measured)) {
-    if (each.sample == row) evidence.measures = each.measures;
+  if (const auto measured = dataset.measures(unit)) {
+    for (const unit::MeasuredLabel& each : *measured) {
+      if (each.sample == place) evidence.measures = each.measures;
+    }
   }
 }
 
-// A kept sample's label is in its shard, wherever the dataset was taken.
-void read_shard(const fs::path& folder, const VerdictLine& line, Evidence& evidence) {
-  if (line.at("shard").empty()) return;
-  const manifests::ShardReader shard(folder / fmt::format("shards/{:06}.h5", std::stoll(line.at("shard"))));
-  const manifests::ShardSample sample = shard.samples(std::stoll(line.at("row")), 1).front();
+// A damaged table is told, not thrown: the rest of the story is still true.
+Evidence gather(const PublishedDataset& dataset, const VerdictRow& row) {
+  Evidence evidence;
+  try {
+    read_stages(dataset, row, evidence);
+  } catch (const std::runtime_error& error) {
+    evidence.missing.emplace_back(error.what());
+  }
+  if (!evidence.record.id.empty() || !row.label) return evidence;
+  // A kept sample's label is in its shard, wherever the dataset was taken.
+  const manifests::ShardSample sample = dataset.sample(row);
   evidence.record = sample.record;
   if (sample.has_keypoints_3d) evidence.after = sample.projected_2d;
+  return evidence;
 }
 
 // (|dx| + |dy|) / 2: the mean of these over the visible keypoints is L_proj.
@@ -183,98 +124,43 @@ ordered_json describe_measures(const filters::LabelMeasures& measures) {
           {"mask_iou", number_or_null(measures.mask_iou)}};
 }
 
-ordered_json describe_verdict(const VerdictLine& line) {
-  ordered_json verdict = {
-      {"verdict", line.at("verdict")}, {"reason", line.at("reason")}, {"detail", line.at("detail")}};
-  for (const char* key : {"initial_error", "final_error", "gain", "iterations", "best_iteration"}) {
-    verdict[key] = number_or_null(line.at(key));
-  }
-  return verdict;
+ordered_json describe_verdict(const VerdictRow& row) {
+  const manifests::Judgement& judgement = row.judgement;
+  const auto if_judged = [&](int count) {
+    return row.is_judged() ? ordered_json(count) : ordered_json(nullptr);
+  };
+  return {{"verdict", manifests::to_string(judgement.verdict)},
+          {"reason", manifests::to_string(judgement.reason)},
+          {"detail", judgement.detail},
+          {"initial_error", number_or_null(judgement.initial_error)},
+          {"final_error", number_or_null(judgement.final_error)},
+          {"gain", number_or_null(judgement.gain)},
+          {"iterations", if_judged(judgement.iterations)},
+          {"best_iteration", if_judged(judgement.best_iteration)}};
 }
 
-ordered_json describe_source(const VerdictLine& line, const Evidence& evidence) {
-  return {{"dataset", line.at("dataset")},
-          {"split", line.at("split")},
-          {"source", line.at("source")},
-          {"species", line.at("species")},
-          {"family", line.at("family")},
+ordered_json describe_source(const VerdictRow& row, const Evidence& evidence) {
+  return {{"dataset", row.dataset},
+          {"split", row.split},
+          {"source", row.source},
+          {"species", row.species},
+          {"family", manifests::to_string(row.family)},
           {"picture", evidence.record.image_ref},
-          {"image_sha256", line.at("image_sha256")}};
+          {"image_sha256", row.image_sha256}};
 }
 
-// Those of the candidate's dataset; null where its labels are no predictions.
-json thresholds_of(const json& dataset, const std::string& name) {
-  const json& all = dataset.at("thresholds");
-  return all.is_object() && all.contains(name) ? all.at(name) : json(nullptr);
+// Those of the candidate's dataset; nothing where its labels are no predictions.
+std::optional<filters::Thresholds> thresholds_of(const DatasetManifest& manifest, const std::string& name) {
+  const auto found = manifest.thresholds.find(name);
+  return found == manifest.thresholds.end() ? std::nullopt : std::optional(found->second);
 }
 
-bool is_from_a_guard(const std::string& reason) {
-  static const std::set<std::string> kReasons{
-      "too_few_keypoints", "scaled_gain_too_small", "held_out_not_better", "pose_implausible",
-      "limbs_implausible", "left_right_swapped",    "mask_mismatch"};
-  return kReasons.count(reason) > 0;
+ordered_json describe_thresholds(const std::optional<filters::Thresholds>& thresholds) {
+  if (!thresholds) return nullptr;
+  return {{"tau_low", thresholds->tau_low}, {"tau_high", thresholds->tau_high}, {"delta", thresholds->delta}};
 }
 
-// What decided, in the numbers of this sample.
-std::string why(const ordered_json& verdict, const json& thresholds) {
-  const auto text = [&](const char* key) { return verdict.at(key).get<std::string>(); };
-  if (text("verdict") == "failed") return "It failed before it could be judged: " + text("detail") + ".";
-  if (text("reason") == "in_test_split") return "It was left out because " + text("detail") + ".";
-  if (text("reason") == "vetoed") return "It was left out by the veto list: " + text("detail") + ".";
-  if (verdict.at("initial_error").is_null()) {
-    return "Its label comes from the annotation file; the fidelity rule judges predictions only.";
-  }
-  if (is_from_a_guard(text("reason"))) return "A guard left it out: " + text("detail") + ".";
-  const double error = verdict.at("initial_error").get<double>();
-  const double low = thresholds.at("tau_low").get<double>();
-  const double high = thresholds.at("tau_high").get<double>();
-  if (text("verdict") == "retained") {
-    return fmt::format("L_proj of the prediction, {:.4f}, lies below tau_low = {:.4f}: kept as it is.", error,
-                       low);
-  }
-  if (text("reason") == "error_too_large") {
-    return fmt::format(
-        "L_proj of the prediction, {:.4f}, reaches tau_high = {:.4f}: too far off to be refined.", error,
-        high);
-  }
-  const std::string adapted = fmt::format(
-      "L_proj of the prediction, {:.4f}, lies between tau_low = {:.4f} and tau_high = {:.4f}: it was "
-      "adapted, {} "
-      "iterations, and fell to {:.4f} at iteration {}.",
-      error, low, high, std::llround(verdict.at("iterations").get<double>()),
-      verdict.at("final_error").get<double>(), std::llround(verdict.at("best_iteration").get<double>()));
-  const double gain = verdict.at("gain").is_null() ? std::nan("") : verdict.at("gain").get<double>();
-  const double delta = thresholds.at("delta").get<double>();
-  if (text("reason") == "gain_too_small") {
-    return adapted +
-           fmt::format(" Its gain within the first iterations, {:.2f} %, is less than delta = {:.2f} %.",
-                       100 * gain, 100 * delta);
-  }
-  const bool fell_below = verdict.at("final_error").get<double>() < low;
-  return adapted + (fell_below
-                        ? fmt::format(" That is below tau_low: kept.")
-                        : fmt::format(" Its gain within the first iterations, {:.2f} %, reaches delta = "
-                                      "{:.2f} %: kept.",
-                                      100 * gain, 100 * delta));
-}
-
-}  // namespace
-
-ordered_json explain(const fs::path& given, const std::string& id) {
-  const fs::path folder = dataset_folder(given);
-  read_dataset_manifest(folder);  // refuses what it does not know
-  const json dataset = json::parse(manifests::read_file(folder / "dataset.json"));
-  const VerdictLine line = find_line(folder / "verdicts.csv", id);
-  Evidence evidence;
-  read_stages(folder, dataset, line, evidence);
-  if (evidence.record.id.empty()) read_shard(folder, line, evidence);
-
-  ordered_json story = {{"id", id}, {"dataset", fs::canonical(folder).filename().string()}};
-  story["verdict"] = describe_verdict(line);
-  const json thresholds = thresholds_of(dataset, line.at("dataset"));
-  story["thresholds"] = thresholds;
-  story["why"] = why(story["verdict"], thresholds);
-  story["source"] = describe_source(line, evidence);
+void add_evidence(const Evidence& evidence, ordered_json& story) {
   if (!evidence.record.id.empty() && evidence.record.box.w_px > 0) {
     story["crop"] = describe_crop(evidence.record);
     story["keypoints"] = describe_keypoints(evidence);
@@ -285,9 +171,26 @@ ordered_json explain(const fs::path& given, const std::string& id) {
   }
   if (!evidence.held_out_curve.empty()) story["held_out_curve"] = evidence.held_out_curve;
   if (evidence.measures) story["measures"] = describe_measures(*evidence.measures);
-  if (!line.at("shard").empty()) {
-    story["label"] = {{"shard", fmt::format("shards/{:06}.h5", std::stoll(line.at("shard")))},
-                      {"row", std::stoll(line.at("row"))}};
+}
+
+}  // namespace
+
+ordered_json explain(const fs::path& given, const std::string& id) {
+  const PublishedDataset dataset(given);
+  const VerdictRow row = dataset.verdict(id);
+  const Evidence evidence = gather(dataset, row);
+  const auto thresholds = thresholds_of(dataset.manifest(), row.dataset);
+  ordered_json story = {{"id", id}, {"dataset", dataset.version_name()}};
+  story["verdict"] = describe_verdict(row);
+  story["thresholds"] = describe_thresholds(thresholds);
+  story["why"] = why(row.judgement, dataset.role(row), thresholds);
+  story["source"] = describe_source(row, evidence);
+  add_evidence(evidence, story);
+  if (const auto kind = dataset.label_kind(row)) {
+    story["label"] = {{"shard", dataset.shard_of_unit(row.label->shard).file},
+                      {"row", row.label->row},
+                      {"kind", manifests::to_string(*kind)},
+                      {"meaning", sentence(*kind)}};
   }
   if (!evidence.missing.empty()) story["missing"] = evidence.missing;
   return story;

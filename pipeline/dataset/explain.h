@@ -8,12 +8,13 @@
 
 namespace q3d::pipeline::dataset {
 
-// Reads the verdict's line, and, where the stages' folders still lie beside the dataset, what predict was
-// asked and gave, and how refine went; of a kept sample without them, what its shard holds. The keys:
+// Reads the candidate's row of verdicts.csv. Where the stages' folders still lie beside the dataset, it reads
+// what predict was asked and gave, and how refine went; of a kept sample without them, it reads the shard.
+// The keys:
 //   id, dataset, verdict {verdict, reason, detail, initial_error, final_error, gain, iterations,
 //   best_iteration}, why (a sentence), thresholds, source {...}, crop {...}, keypoints [{name, v, weight,
-//   annotated_px, error_before, error_after}], curve [L_proj of iterates 0..n], label {shard, row}, missing
-//   (what could not be found)
+//   annotated_px, error_before, error_after}], curve [L_proj of iterates 0..n], label {shard, row, kind,
+//   meaning}, missing (what could not be found)
 // Errors are in crop units (crop side = 1). Throws std::runtime_error when the folder holds no dataset or the
 // id is none of its candidates'; then it names the nearest.
 nlohmann::ordered_json explain(const std::filesystem::path& given, const std::string& id);

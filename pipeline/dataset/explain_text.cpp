@@ -113,14 +113,16 @@ std::string tell(const ordered_json& story) {
   told += line("verdict", verdict.at("verdict").get<std::string>() +
                               (reason.empty() || reason == "none" ? "" : ": " + reason));
   told += line("why", story.at("why").get<std::string>());
-  if (const std::string detail = verdict.at("detail").get<std::string>(); !detail.empty()) {
-    told += line("detail", detail);
-  }
+  const std::string detail = verdict.at("detail").get<std::string>();
+  const bool is_told = story.at("why").get<std::string>().find(detail) != std::string::npos;
+  if (!is_told) told += line("detail", detail);
   told += tell_source(story.at("source"));
   if (story.contains("crop")) told += tell_crop(story.at("crop"));
   if (story.contains("label")) {
-    told += line("label", fmt::format("row {} of {}", story.at("label").at("row").dump(),
-                                      story.at("label").at("shard").get<std::string>()));
+    const ordered_json& label = story.at("label");
+    told += line("label",
+                 fmt::format("row {} of {}. {}", label.at("row").dump(), label.at("shard").get<std::string>(),
+                             label.at("meaning").get<std::string>()));
   }
   if (story.contains("keypoints")) told += tell_keypoints(story);
   if (story.contains("curve")) told += tell_curve(story.at("curve"));

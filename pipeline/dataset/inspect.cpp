@@ -5,11 +5,12 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
+#include <optional>
 #include <stdexcept>
 
 #include "manifests/atomic_file.h"
 #include "manifests/record_json.h"
-#include "pipeline/dataset/dataset_manifest.h"
+#include "pipeline/dataset/published_dataset.h"
 
 namespace q3d::pipeline::dataset {
 namespace {
@@ -17,12 +18,11 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
-std::vector<fs::path> shard_files(const fs::path& path) {
-  if (!fs::is_directory(path)) return {path};
-  const fs::path folder = dataset_folder(path);
-  std::vector<fs::path> files;
-  for (const ShardEntry& shard : read_dataset_manifest(folder).shards) files.push_back(folder / shard.file);
-  return files;
+// The row of a shard that holds this id.
+std::optional<std::int64_t> row_of(const manifests::ShardReader& shard, const std::string& id) {
+  const std::vector<std::string> ids = shard.table().text("id", 0, shard.rows());
+  const auto found = std::find(ids.begin(), ids.end(), id);
+  return found == ids.end() ? std::nullopt : std::optional<std::int64_t>(found - ids.begin());
 }
 
 ordered_json describe_judgement(const manifests::Judgement& judgement) {
@@ -78,40 +78,58 @@ ordered_json describe_shard(const fs::path& path) {
 
 ordered_json describe(const fs::path& path) {
   if (!fs::is_directory(path)) return describe_shard(path);
-  const fs::path folder = dataset_folder(path);
-  read_dataset_manifest(folder);  // refuses what it does not know
-  ordered_json document = ordered_json::parse(manifests::read_file(folder / "dataset.json"));
-  document["folder"] = folder.string();
+  const PublishedDataset dataset(path);  // refuses what it does not know
+  ordered_json document = ordered_json::parse(manifests::read_file(dataset.folder() / "dataset.json"));
+  document["folder"] = dataset.folder().string();
   return document;
 }
 
-ordered_json describe_sample(const fs::path& path, const std::string& id) {
-  for (const fs::path& file : shard_files(path)) {
-    const manifests::ShardReader shard(file);
-    const std::vector<std::string> ids = shard.table().text("id", 0, shard.rows());
-    const auto found = std::find(ids.begin(), ids.end(), id);
-    if (found != ids.end()) return describe_whole(file, shard.samples(found - ids.begin(), 1).front());
+FoundSample find_sample(const fs::path& path, const std::string& id) {
+  if (fs::is_directory(path)) {
+    const PublishedDataset dataset(path);
+    const VerdictRow row = dataset.verdict(id);
+    if (row.label) return {dataset.shard_file(dataset.shard_of_unit(row.label->shard)), dataset.sample(row)};
+    throw std::runtime_error(fmt::format(
+        "{}: {} has no label, so no shard holds it: {} ({}). `quadruped3d explain` tells what is known of it",
+        dataset.folder().string(), id, manifests::to_string(row.judgement.verdict),
+        manifests::to_string(row.judgement.reason)));
   }
+  const manifests::ShardReader shard(path);
+  if (const auto row = row_of(shard, id)) return {path, std::move(shard.samples(*row, 1).front())};
   throw std::runtime_error(
-      fmt::format("{}: no sample {} in the shards; verdicts.csv lists every candidate with what "
-                  "became of it",
+      fmt::format("{}: no sample {}; verdicts.csv of the dataset lists every candidate with its shard",
                   path.string(), id));
 }
 
+ordered_json describe_sample(const fs::path& path, const std::string& id) {
+  const FoundSample found = find_sample(path, id);
+  return describe_whole(found.shard, found.sample);
+}
+
 std::vector<manifests::ShardSample> spread_samples(const fs::path& path, int count) {
-  std::vector<manifests::ShardReader> shards;
+  std::vector<std::pair<fs::path, std::int64_t>> shards;  // with their rows
+  if (fs::is_directory(path)) {
+    const PublishedDataset dataset(path);
+    for (const ShardEntry& shard : dataset.manifest().shards) {
+      shards.emplace_back(dataset.shard_file(shard), shard.rows);
+    }
+  } else {
+    shards.emplace_back(path, manifests::ShardReader(path).rows());
+  }
   std::int64_t total = 0;
-  for (const fs::path& file : shard_files(path)) total += shards.emplace_back(file).rows();
+  for (const auto& [file, rows] : shards) total += rows;
   const std::int64_t wanted = std::min<std::int64_t>(count, total);
   std::vector<manifests::ShardSample> chosen;
-  std::int64_t first = 0;
-  for (const manifests::ShardReader& shard : shards) {
+  std::int64_t first = 0;  // row of the shard's first sample, counted through all shards
+  for (const auto& [file, rows] : shards) {
+    std::optional<manifests::ShardReader> shard;  // opened when a row of it is wanted
     for (auto next = static_cast<std::int64_t>(chosen.size()); next < wanted; ++next) {
       const std::int64_t row = next * total / wanted - first;
-      if (row >= shard.rows()) break;
-      chosen.push_back(std::move(shard.samples(row, 1).front()));
+      if (row >= rows) break;
+      if (!shard) shard.emplace(file);
+      chosen.push_back(std::move(shard->samples(row, 1).front()));
     }
-    first += shard.rows();
+    first += rows;
   }
   return chosen;
 }

@@ -10,13 +10,14 @@
 #include <mutex>
 #include <set>
 #include <stdexcept>
+#include <unordered_map>
 
 #include "filters/metrics.h"
 #include "loaders/pictures/encode.h"
-#include "manifests/atomic_file.h"
 #include "manifests/digest.h"
+#include "manifests/enumerators.h"
 #include "manifests/shard.h"
-#include "pipeline/dataset/dataset_manifest.h"
+#include "pipeline/dataset/published_dataset.h"
 #include "pipeline/run/interrupt.h"
 #include "pipeline/run/progress.h"
 #include "pipeline/unit/annotated_body.h"
@@ -35,19 +36,18 @@ constexpr double kFocalInCropUnits = 1000.0 / 256.0;
 
 class Verifier {
  public:
-  explicit Verifier(const fs::path& given)
-      : folder_(dataset_folder(given)), manifest_(read_dataset_manifest(folder_)) {
-    summary_.folder = folder_;
-  }
+  explicit Verifier(const fs::path& given) : dataset_(given) { summary_.folder = dataset_.folder(); }
 
   VerifySummary run(bool quiet) {
-    run::Progress progress("shards", static_cast<std::int64_t>(manifest_.shards.size()), quiet);
-    for (const ShardEntry& entry : manifest_.shards) {
+    const std::vector<ShardEntry>& shards = dataset_.manifest().shards;
+    run::Progress progress("shards", static_cast<std::int64_t>(shards.size()), quiet);
+    for (const ShardEntry& entry : shards) {
       run::throw_if_interrupted();
       check_shard(entry);
       progress.advance(1);
     }
     check_books();
+    check_verdicts();
     check_labels();
     check_strays();
     return summary_;
@@ -61,7 +61,7 @@ class Verifier {
 
   void check_shard(const ShardEntry& entry) {
     ++summary_.shards;
-    const fs::path path = folder_ / entry.file;
+    const fs::path path = dataset_.shard_file(entry);
     try {
       const std::string digest = manifests::sha256_file(path);
       if (digest != entry.sha256) {
@@ -91,10 +91,10 @@ class Verifier {
     });
     for (const manifests::ShardSample& sample : shard.samples) {
       ++summary_.samples;
-      ++labels_[std::string(manifests::to_string(sample.label_kind))];
+      ++labels_[sample.label_kind];
       summary_.pictures += sample.crop.empty() ? 0 : 1;
-      if (!ids_.insert(sample.record.id).second)
-        problem(entry.file + ": sample " + sample.record.id + " occurs twice");
+      const bool is_new = ids_.emplace(sample.record.id, sample.judgement.verdict).second;
+      if (!is_new) problem(entry.file + ": sample " + sample.record.id + " occurs twice");
       labelled_.add(sample.judgement.verdict);
     }
   }
@@ -173,18 +173,18 @@ class Verifier {
   }
 
   void check_books() {
-    if (content_id(manifest_.shards) != manifest_.content_id) {
+    const DatasetManifest& manifest = dataset_.manifest();
+    if (content_id(manifest.shards) != manifest.content_id) {
       problem("dataset.json: content_id is not the hash of the shard digests that it lists");
     }
     try {
-      const std::string csv = manifests::read_file(folder_ / "verdicts.csv");
-      if (manifests::sha256(csv) != manifest_.verdicts_sha256) {
+      if (manifests::sha256_file(dataset_.verdicts_file()) != manifest.verdicts_sha256) {
         problem("verdicts.csv: its SHA-256 is not the one in dataset.json");
       }
     } catch (const std::runtime_error& error) {
       problem(error.what());
     }
-    const Counts& counts = manifest_.counts;
+    const Counts& counts = manifest.counts;
     if (counts.retained + counts.refined + counts.discarded + counts.failed != counts.candidates) {
       problem(fmt::format(
           "dataset.json: {} retained + {} refined + {} discarded + {} failed are not {} candidates",
@@ -196,11 +196,45 @@ class Verifier {
     }
   }
 
+  // verdicts.csv tells of the same candidates as dataset.json and the shards.
+  void check_verdicts() {
+    Counts counts;
+    std::size_t kept = 0;
+    std::size_t foreign = 0;  // kept ones that no shard holds with this verdict
+    try {
+      VerdictReader reader(dataset_.verdicts_file());
+      while (const auto row = reader.next()) {
+        counts.add(row->judgement.verdict);
+        if (!manifests::is_kept(row->judgement.verdict)) continue;
+        ++kept;
+        const auto found = ids_.find(row->id);
+        foreign += found == ids_.end() || found->second != row->judgement.verdict ? 1 : 0;
+      }
+    } catch (const std::runtime_error& error) {
+      problem(error.what());
+      return;
+    }
+    const Counts& listed = dataset_.manifest().counts;
+    if (counts != listed) {
+      problem(fmt::format(
+          "verdicts.csv has {} candidates ({} retained, {} refined, {} discarded, {} failed), dataset.json "
+          "says {} ({}, {}, {}, {})",
+          counts.candidates, counts.retained, counts.refined, counts.discarded, counts.failed,
+          listed.candidates, listed.retained, listed.refined, listed.discarded, listed.failed));
+    }
+    if (foreign > 0 || kept != ids_.size()) {
+      problem(
+          fmt::format("verdicts.csv keeps {} candidates and the shards hold {}; {} of the first are not "
+                      "among the second with their verdict",
+                      kept, ids_.size(), foreign));
+    }
+  }
+
   void check_labels() {
-    for (const auto& [kind, count] : manifest_.labels) {
+    for (const auto& [kind, count] : dataset_.manifest().labels) {
       if (labels_[kind] != count) {
-        problem(
-            fmt::format("the shards hold {} {} labels, dataset.json says {}", labels_[kind], kind, count));
+        problem(fmt::format("the shards hold {} {} labels, dataset.json says {}", labels_[kind],
+                            manifests::to_string(kind), count));
       }
     }
   }
@@ -208,21 +242,22 @@ class Verifier {
   // A file that dataset.json does not list is not part of the dataset.
   void check_strays() {
     std::set<std::string> listed;
-    for (const ShardEntry& entry : manifest_.shards) listed.insert(fs::path(entry.file).filename().string());
+    for (const ShardEntry& entry : dataset_.manifest().shards) {
+      listed.insert(fs::path(entry.file).filename().string());
+    }
     std::error_code error;
-    for (const auto& file : fs::directory_iterator(folder_ / "shards", error)) {
+    for (const auto& file : fs::directory_iterator(dataset_.folder() / "shards", error)) {
       const std::string name = file.path().filename().string();
       if (listed.count(name) == 0) problem("shards/" + name + ": not listed in dataset.json");
     }
   }
 
-  fs::path folder_;
-  DatasetManifest manifest_;
+  PublishedDataset dataset_;
   VerifySummary summary_;
-  std::mutex mutex_;  // guards summary_.problems
-  std::set<std::string> ids_;
+  std::mutex mutex_;                                         // guards summary_.problems
+  std::unordered_map<std::string, manifests::Verdict> ids_;  // of the samples in the shards
   Counts labelled_;
-  std::map<std::string, std::int64_t> labels_;  // by kind
+  std::map<manifests::LabelKind, std::int64_t> labels_;
 };
 
 }  // namespace

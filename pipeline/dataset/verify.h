@@ -17,9 +17,9 @@ struct VerifySummary {
 };
 
 // Recomputes every digest from the bytes (no cache), reads every shard through its schema, decodes every
-// stored crop, and checks that counts, ids, verdicts, labels and projections agree with each other. Problems
-// are listed, not thrown; throws std::runtime_error when `given` holds no readable dataset.json at all,
-// Interrupted.
+// stored crop, and checks that dataset.json, verdicts.csv and the shards agree with each other: counts, ids,
+// verdicts, labels and projections. Problems are listed, not thrown; throws std::runtime_error when `given`
+// holds no readable dataset.json at all, and Interrupted.
 VerifySummary verify(const std::filesystem::path& given, bool quiet);
 
 }  // namespace q3d::pipeline::dataset

@@ -17,11 +17,6 @@ namespace {
 using Evaluations = std::vector<const StoredEvaluation*>;
 using ById = std::map<std::string, const StoredSample*>;
 
-// An id is dataset/split/picture#annotation.
-std::string picture_of(const std::string& id) {
-  return id.substr(0, id.rfind('#'));
-}
-
 // The paired samples of one dataset: first all runs of `before`, then all of `after`.
 class PairedSamples {
  public:
@@ -72,12 +67,6 @@ class PairedSamples {
   }
 
  private:
-  static Finding finding(const filters::BootstrapInterval& difference, bool higher_is_better) {
-    if (difference.low > 0.0) return higher_is_better ? Finding::better : Finding::worse;
-    if (difference.high < 0.0) return higher_is_better ? Finding::worse : Finding::better;
-    return Finding::no_difference_shown;
-  }
-
   void require_one_normaliser(const std::string& id) const {
     std::set<std::string> normalisers;
     for (const ById& run : runs_) {
@@ -226,18 +215,9 @@ std::string settings_name(const ComparisonRow& row) {
 
 }  // namespace
 
-std::string_view to_string(Finding finding) {
-  if (finding == Finding::better) return "better";
-  return finding == Finding::worse ? "worse" : "no difference shown";
-}
-
 Comparison compare(const std::vector<StoredEvaluation>& before, const std::vector<StoredEvaluation>& after,
                    const CompareOptions& options) {
-  if (before.empty() || before.size() != after.size()) {
-    throw std::invalid_argument(
-        fmt::format("got {} evaluations before and {} after, expected as many of each, 1 or more",
-                    before.size(), after.size()));
-  }
+  require_pairs(before.size(), after.size(), "evaluations");
   Evaluations all;
   for (const auto* side : {&before, &after}) {
     for (const StoredEvaluation& evaluation : *side) all.push_back(&evaluation);
@@ -258,54 +238,41 @@ nlohmann::ordered_json to_json(const Comparison& comparison, const std::vector<S
   };
   ordered_json rows = ordered_json::array();
   for (const ComparisonRow& row : comparison.rows) {
-    rows.push_back({{"dataset", row.dataset},
-                    {"before_setting", row.before_setting},
-                    {"after_setting", row.after_setting},
-                    {"metric", kMetrics[index_of(row.metric)].key},
-                    {"samples", row.samples},
-                    {"unpaired", row.unpaired},
-                    {"pictures", row.pictures},
-                    {"before", row.before},
-                    {"after", row.after},
-                    {"difference", row.difference.mean},
-                    {"low", row.difference.low},
-                    {"high", row.difference.high},
-                    {"finding", to_string(row.finding)}});
+    ordered_json object = {{"dataset", row.dataset},
+                           {"before_setting", row.before_setting},
+                           {"after_setting", row.after_setting},
+                           {"metric", kMetrics[index_of(row.metric)].key},
+                           {"samples", row.samples},
+                           {"unpaired", row.unpaired},
+                           {"pictures", row.pictures}};
+    add_difference(row, object);
+    rows.push_back(std::move(object));
   }
-  const filters::BootstrapOptions& bootstrap = comparison.options.bootstrap;
-  return {{"format", "quadruped3d-comparison"},
-          {"schema", 1},
-          {"toolkit", run::version()},
-          {"before", sides(before)},
-          {"after", sides(after)},
-          {"pairs", comparison.pairs},
-          {"resamples", bootstrap.resamples},
-          {"confidence", bootstrap.confidence},
-          {"seed", bootstrap.seed},
-          {"rows", std::move(rows)},
-          {"notes", comparison.notes}};
+  ordered_json document = {{"format", "quadruped3d-comparison"},
+                           {"schema", 1},
+                           {"toolkit", run::version()},
+                           {"before", sides(before)},
+                           {"after", sides(after)},
+                           {"pairs", comparison.pairs}};
+  add_bootstrap(comparison.options.bootstrap, document);
+  document["rows"] = std::move(rows);
+  document["notes"] = comparison.notes;
+  return document;
 }
 
 std::string summary_text(const Comparison& comparison) {
-  const std::string interval =
-      fmt::format("{:g} % interval", 100.0 * comparison.options.bootstrap.confidence);
-  TextTable table({"dataset", "setting", "metric", "samples", "before", "after", "difference", interval,
-                   "change %", "finding"},
-                  3);
+  std::vector<std::string> titles{"dataset", "setting", "metric", "samples"};
+  append(difference_titles(comparison.options.bootstrap), titles);
+  TextTable table(std::move(titles), 3);
   std::string last;
   for (const ComparisonRow& row : comparison.rows) {
-    const MetricInfo& info = kMetrics[index_of(row.metric)];
     const std::string place = row.dataset + "\n" + settings_name(row);
     const bool same = place == last;
     last = place;
-    const filters::BootstrapInterval& difference = row.difference;
-    table.add(
-        {same ? "" : row.dataset, same ? "" : settings_name(row), info.title, std::to_string(row.samples),
-         cell(row.before, info.decimals), cell(row.after, info.decimals),
-         fmt::format("{:+.{}f}", difference.mean, info.decimals),
-         fmt::format("{:+.{}f} .. {:+.{}f}", difference.low, info.decimals, difference.high, info.decimals),
-         row.before == 0.0 ? "-" : fmt::format("{:+.1f}", 100.0 * difference.mean / row.before),
-         std::string(to_string(row.finding))});
+    std::vector<std::string> cells{same ? "" : row.dataset, same ? "" : settings_name(row),
+                                   kMetrics[index_of(row.metric)].title, std::to_string(row.samples)};
+    append(difference_cells(row), cells);
+    table.add(std::move(cells));
   }
   std::string text = table.text();
   for (const std::string& note : comparison.notes) text += "note: " + note + "\n";

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "filters/bootstrap.h"
+#include "pipeline/evaluation/difference.h"
 #include "pipeline/evaluation/evaluation_files.h"
 
 namespace q3d::pipeline::evaluation {
@@ -19,21 +20,14 @@ struct CompareOptions {
   std::string after_setting;
 };
 
-enum class Finding { better, worse, no_difference_shown };
-std::string_view to_string(Finding finding);  // "better", "worse", "no difference shown"
-
-struct ComparisonRow {
+// The means are those over samples and pairs.
+struct ComparisonRow : ComparedMeans {
   std::string dataset;
   std::string before_setting;
   std::string after_setting;
-  Metric metric = Metric::auc;
   std::int64_t samples = 0;   // with a value in every evaluation
   std::int64_t unpaired = 0;  // with a value in some only, and so left out
   std::int64_t pictures = 0;
-  double before = 0.0;  // means over samples and pairs
-  double after = 0.0;
-  filters::BootstrapInterval difference;  // after minus before
-  Finding finding = Finding::no_difference_shown;
 };
 
 struct Comparison {

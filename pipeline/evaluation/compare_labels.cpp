@@ -74,9 +74,7 @@ class Items {
     for (const StoredLabels& pool : pools) {
       for (const StoredLabel& label : pool.candidates) {
         if (!numbers_.emplace(label.id, numbers_.size()).second) continue;
-        // An id is dataset/split/picture#annotation.
-        const std::string picture = label.id.substr(0, label.id.rfind('#'));
-        picture_of_item_.push_back(pictures.emplace(picture, pictures.size()).first->second);
+        picture_of_item_.push_back(pictures.emplace(picture_of(label.id), pictures.size()).first->second);
       }
     }
   }
@@ -122,8 +120,7 @@ void add_rows(const std::string& group, const Sets& sets, const Items& items, La
     std::tie(row.samples_after, row.after) = count_and_mean(after);
     if (row.samples_before == 0 || row.samples_after == 0) continue;
     row.difference = filters::bootstrap_of_sets(before, after, items.pictures(), comparison.bootstrap);
-    if (row.difference.high < 0.0) row.finding = Finding::better;
-    if (row.difference.low > 0.0) row.finding = Finding::worse;
+    row.finding = finding(row.difference, kMetrics[index_of(metric)].higher_is_better);
     comparison.rows.push_back(row);
   }
 }
@@ -133,11 +130,7 @@ void add_rows(const std::string& group, const Sets& sets, const Items& items, La
 LabelComparison compare_labels(const std::vector<StoredLabels>& before,
                                const std::vector<StoredLabels>& after,
                                const filters::BootstrapOptions& options) {
-  if (before.empty() || before.size() != after.size()) {
-    throw std::invalid_argument(
-        fmt::format("got {} label evaluations before and {} after, expected as many of each, 1 or more",
-                    before.size(), after.size()));
-  }
+  require_pairs(before.size(), after.size(), "label evaluations");
   LabelComparison comparison;
   comparison.bootstrap = options;
   Sets all, equal, both;
@@ -190,25 +183,20 @@ nlohmann::ordered_json to_json(const LabelComparison& comparison, const std::vec
   }
   ordered_json rows = ordered_json::array();
   for (const LabelComparisonRow& row : comparison.rows) {
-    rows.push_back({{"group", row.group},
-                    {"metric", kMetrics[index_of(row.metric)].key},
-                    {"samples_before", row.samples_before},
-                    {"samples_after", row.samples_after},
-                    {"before", row.before},
-                    {"after", row.after},
-                    {"difference", row.difference.mean},
-                    {"low", row.difference.low},
-                    {"high", row.difference.high},
-                    {"finding", to_string(row.finding)}});
+    ordered_json object = {{"group", row.group},
+                           {"metric", kMetrics[index_of(row.metric)].key},
+                           {"samples_before", row.samples_before},
+                           {"samples_after", row.samples_after}};
+    add_difference(row, object);
+    rows.push_back(std::move(object));
   }
-  return {{"format", "quadruped3d-label-comparison"},
-          {"schema", 1},
-          {"toolkit", run::version()},
-          {"pairs", std::move(pairs)},
-          {"resamples", comparison.bootstrap.resamples},
-          {"confidence", comparison.bootstrap.confidence},
-          {"seed", comparison.bootstrap.seed},
-          {"rows", std::move(rows)}};
+  ordered_json document = {{"format", "quadruped3d-label-comparison"},
+                           {"schema", 1},
+                           {"toolkit", run::version()},
+                           {"pairs", std::move(pairs)}};
+  add_bootstrap(comparison.bootstrap, document);
+  document["rows"] = std::move(rows);
+  return document;
 }
 
 std::string summary_text(const LabelComparison& comparison) {
@@ -218,18 +206,14 @@ std::string summary_text(const LabelComparison& comparison) {
     yields.add({std::to_string(i + 1), std::to_string(pair.candidates), std::to_string(pair.kept_before),
                 std::to_string(pair.kept_after), std::to_string(pair.equal), std::to_string(pair.both)});
   }
-  const std::string interval = fmt::format("{:g} % interval", 100.0 * comparison.bootstrap.confidence);
-  TextTable table({"labels", "metric", "before", "after", "difference", interval, "change %", "finding"}, 2);
+  std::vector<std::string> titles{"labels", "metric"};
+  append(difference_titles(comparison.bootstrap), titles);
+  TextTable table(std::move(titles), 2);
   std::string last;
   for (const LabelComparisonRow& row : comparison.rows) {
-    const MetricInfo& info = kMetrics[index_of(row.metric)];
-    const filters::BootstrapInterval& difference = row.difference;
-    table.add(
-        {row.group == last ? "" : row.group, info.title, cell(row.before, info.decimals),
-         cell(row.after, info.decimals), fmt::format("{:+.{}f}", difference.mean, info.decimals),
-         fmt::format("{:+.{}f} .. {:+.{}f}", difference.low, info.decimals, difference.high, info.decimals),
-         row.before == 0.0 ? "-" : fmt::format("{:+.1f}", 100.0 * difference.mean / row.before),
-         std::string(to_string(row.finding))});
+    std::vector<std::string> cells{row.group == last ? "" : row.group, kMetrics[index_of(row.metric)].title};
+    append(difference_cells(row), cells);
+    table.add(std::move(cells));
     last = row.group;
   }
   return yields.text() + "\n" + table.text();

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "filters/bootstrap.h"
-#include "pipeline/evaluation/compare.h"
+#include "pipeline/evaluation/difference.h"
 #include "pipeline/evaluation/label_files.h"
 
 namespace q3d::pipeline::evaluation {
@@ -21,15 +21,11 @@ struct LabelPair {
   std::int64_t both = 0;   // of them, kept by both
 };
 
-struct LabelComparisonRow {
-  std::string group;  // "equal yield", "kept by both" (of equal yield), "all kept"
-  Metric metric = Metric::pa_mpjpe;
+// The means are those over all labels of a side that have a value.
+struct LabelComparisonRow : ComparedMeans {
+  std::string group;                // "equal yield", "kept by both" (of equal yield), "all kept"
   std::int64_t samples_before = 0;  // with a value, over all pairs
   std::int64_t samples_after = 0;
-  double before = 0.0;  // their means
-  double after = 0.0;
-  filters::BootstrapInterval difference;  // after minus before
-  Finding finding = Finding::no_difference_shown;
 };
 
 struct LabelComparison {

@@ -5,7 +5,7 @@
 #include <stdexcept>
 
 #include "manifests/atomic_file.h"
-#include "pipeline/evaluation/csv.h"
+#include "manifests/csv.h"
 #include "pipeline/evaluation/report.h"
 
 namespace q3d::pipeline::evaluation {
@@ -14,24 +14,21 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-void read_samples(const std::vector<CsvRow>& rows, StoredEvaluation& evaluation) {
-  if (rows.empty()) throw std::invalid_argument("the file is empty");
-  const CsvRow& header = rows.front();
-  const std::size_t dataset = column_of(header, "dataset"), id = column_of(header, "id"),
-                    left_out = column_of(header, "left_out"), setting = column_of(header, "setting"),
-                    normaliser = column_of(header, "normaliser");
+void read_samples(manifests::CsvTableReader rows, StoredEvaluation& evaluation) {
+  const std::size_t dataset = rows.column("dataset"), id = rows.column("id"),
+                    left_out = rows.column("left_out"), setting = rows.column("setting"),
+                    normaliser = rows.column("normaliser");
   std::array<std::size_t, kMetricCount> metrics{};
-  for (const MetricInfo& info : kMetrics) metrics[index_of(info.metric)] = column_of(header, info.key);
-  for (std::size_t r = 1; r < rows.size(); ++r) {
-    const CsvRow& row = rows[r];
-    if (!row[left_out].empty()) continue;
-    const auto known = evaluation.datasets.find(row[dataset]);
+  for (const MetricInfo& info : kMetrics) metrics[index_of(info.metric)] = rows.column(info.key);
+  while (rows.next()) {
+    if (!rows.cell(left_out).empty()) continue;
+    const auto known = evaluation.datasets.find(rows.cell(dataset));
     if (known == evaluation.datasets.end()) {
-      throw std::invalid_argument("the dataset " + row[dataset] + " is not in evaluation.json");
+      rows.fail("the dataset " + rows.cell(dataset), "one of those in evaluation.json");
     }
-    StoredSample sample{row[id], row[normaliser], {}};
-    for (std::size_t m = 0; m < kMetricCount; ++m) sample.values[m] = number_of(row[metrics[m]]);
-    known->second.settings[row[setting]].push_back(std::move(sample));
+    StoredSample sample{rows.cell(id), rows.cell(normaliser), {}};
+    for (std::size_t m = 0; m < kMetricCount; ++m) sample.values[m] = rows.number(metrics[m]);
+    known->second.settings[rows.cell(setting)].push_back(std::move(sample));
   }
 }
 
@@ -71,7 +68,8 @@ StoredEvaluation read_evaluation(const fs::path& path) {
     StoredEvaluation evaluation = read_description(description);
     evaluation.folder = folder.string();
     reading = samples;
-    read_samples(parse_csv(manifests::read_file(samples)), evaluation);
+    const std::string text = manifests::read_file(samples);
+    read_samples({text, samples.string()}, evaluation);
     return evaluation;
   } catch (const std::exception& error) {
     const std::string what = error.what();

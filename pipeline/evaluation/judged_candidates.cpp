@@ -5,9 +5,8 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "manifests/atomic_file.h"
 #include "pipeline/build/publish.h"
-#include "pipeline/evaluation/csv.h"
+#include "pipeline/dataset/published_dataset.h"
 #include "pipeline/run/errors.h"
 #include "pipeline/stages/stage_store.h"
 #include "pipeline/unit/unit_tables.h"
@@ -18,29 +17,6 @@ namespace {
 namespace fs = std::filesystem;
 using manifests::Reason;
 using manifests::Verdict;
-
-struct PublishedVerdict {
-  std::string id;
-  Verdict verdict = Verdict::failed;
-  Reason reason = Reason::none;
-};
-
-std::vector<PublishedVerdict> read_verdicts(const fs::path& file) {
-  try {
-    const std::vector<CsvRow> rows = parse_csv(manifests::read_file(file));
-    if (rows.empty()) throw std::invalid_argument("the file is empty");
-    const std::size_t id = column_of(rows[0], "id"), verdict = column_of(rows[0], "verdict"),
-                      reason = column_of(rows[0], "reason");
-    std::vector<PublishedVerdict> verdicts;
-    for (std::size_t r = 1; r < rows.size(); ++r) {
-      verdicts.push_back({rows[r][id], manifests::verdict_from_string(rows[r][verdict]),
-                          manifests::reason_from_string(rows[r][reason])});
-    }
-    return verdicts;
-  } catch (const std::invalid_argument& error) {
-    throw std::runtime_error(fmt::format("{}: {}", file.string(), error.what()));
-  }
-}
 
 // Opening a store would make its folder.
 stages::StageStore open_store(const fs::path& out, const std::string& stage, const std::string& key) {
@@ -61,7 +37,8 @@ manifests::Table load(const stages::StageStore& store, const candidates::Unit& u
 }
 
 void add_unit(const candidates::Unit& unit, std::span<const candidates::Candidate> candidates,
-              std::span<const PublishedVerdict> verdicts, const std::vector<unit::PredictedSample>& predicted,
+              std::span<const dataset::VerdictRow> verdicts,
+              const std::vector<unit::PredictedSample>& predicted,
               const std::vector<unit::RefinedSample>& refined, JudgedPool& pool) {
   std::vector<const device::BodyPrediction*> refined_of(unit.count, nullptr);
   for (const unit::RefinedSample& sample : refined) refined_of.at(sample.sample) = &sample.body;
@@ -73,8 +50,8 @@ void add_unit(const candidates::Unit& unit, std::span<const candidates::Candidat
     }
     JudgedCandidate& judged = pool.candidates.emplace_back();
     judged.record = candidates[i].record;
-    judged.verdict = verdicts[i].verdict;
-    judged.reason = verdicts[i].reason;
+    judged.verdict = verdicts[i].judgement.verdict;
+    judged.reason = verdicts[i].judgement.reason;
     judged.predicted = predicted[i].body;
     if (judged.verdict != Verdict::refined) continue;
     if (refined_of[i] == nullptr) {
@@ -106,10 +83,11 @@ JudgedPool read_judged_pool(const config::BuildConfig& config, build::Workspace&
                     "the same config and output folder first",
                     folder.string()));
   }
-  const std::vector<PublishedVerdict> verdicts = read_verdicts(folder / "verdicts.csv");
+  const dataset::PublishedDataset published(folder);
+  const std::vector<dataset::VerdictRow> verdicts = published.verdicts();
   const bool fits =
       std::equal(verdicts.begin(), verdicts.end(), ingest.candidates.begin(), ingest.candidates.end(),
-                 [](const PublishedVerdict& verdict, const candidates::Candidate& each) {
+                 [](const dataset::VerdictRow& verdict, const candidates::Candidate& each) {
                    return verdict.id == each.record.id;
                  });
   if (!fits) {
@@ -119,7 +97,7 @@ JudgedPool read_judged_pool(const config::BuildConfig& config, build::Workspace&
   const stages::StageStore refinements = open_store(workspace.out(), "refine", keys.refine);
   JudgedPool pool;
   pool.dataset = folder.filename().string();
-  pool.content_id = dataset::read_dataset_manifest(folder).content_id;
+  pool.content_id = published.manifest().content_id;
   for (const candidates::Unit& unit : ingest.units) {
     add_unit(unit, std::span(ingest.candidates).subspan(unit.first, unit.count),
              std::span(verdicts).subspan(unit.first, unit.count),

@@ -7,30 +7,28 @@
 #include <stdexcept>
 
 #include "manifests/atomic_file.h"
-#include "manifests/verdict.h"
-#include "pipeline/evaluation/csv.h"
+#include "manifests/csv.h"
+#include "manifests/enumerators.h"
 
 namespace q3d::pipeline::evaluation {
 namespace {
 
 namespace fs = std::filesystem;
-using manifests::Verdict;
 using nlohmann::json;
 
-std::vector<StoredLabel> read_candidates(const std::vector<CsvRow>& rows) {
-  if (rows.empty()) throw std::invalid_argument("the file is empty");
-  const std::size_t id = column_of(rows[0], "id");
-  const std::size_t verdict = column_of(rows[0], "verdict");
+std::vector<StoredLabel> read_candidates(manifests::CsvTableReader rows) {
+  const std::size_t id = rows.column("id");
+  const std::size_t verdict = rows.column("verdict");
+  std::array<std::size_t, kMetricCount> metrics{};
+  for (const MetricInfo& info : kMetrics) {
+    metrics[index_of(info.metric)] = rows.column(fmt::format("label_{}", info.key));
+  }
   std::vector<StoredLabel> labels;
-  for (std::size_t r = 1; r < rows.size(); ++r) {
+  while (rows.next()) {
     StoredLabel& label = labels.emplace_back();
-    label.id = rows[r][id];
-    const Verdict judged = manifests::verdict_from_string(rows[r][verdict]);
-    label.kept = judged == Verdict::retained || judged == Verdict::refined;
-    for (const MetricInfo& info : kMetrics) {
-      label.values[index_of(info.metric)] =
-          number_of(rows[r][column_of(rows[0], fmt::format("label_{}", info.key))]);
-    }
+    label.id = rows.cell(id);
+    label.kept = manifests::is_kept(manifests::verdict_from_string(rows.cell(verdict)));
+    for (std::size_t m = 0; m < kMetricCount; ++m) label.values[m] = rows.number(metrics[m]);
   }
   return labels;
 }
@@ -57,7 +55,8 @@ StoredLabels read_label_evaluation(const fs::path& folder) {
   try {
     read_description(reading, labels);
     reading = folder / "labels.csv";
-    labels.candidates = read_candidates(parse_csv(manifests::read_file(reading)));
+    const std::string text = manifests::read_file(reading);
+    labels.candidates = read_candidates({text, reading.string()});
     return labels;
   } catch (const std::exception& error) {
     const std::string what = error.what();

@@ -1,7 +1,7 @@
 #include <fmt/format.h>
 
 #include "manifests/atomic_file.h"
-#include "pipeline/evaluation/csv.h"
+#include "manifests/csv.h"
 #include "pipeline/evaluation/labels.h"
 #include "pipeline/evaluation/report_values.h"
 #include "pipeline/evaluation/text_table.h"
@@ -10,6 +10,8 @@
 namespace q3d::pipeline::evaluation {
 namespace {
 
+using manifests::csv_line;
+using manifests::CsvRow;
 using nlohmann::ordered_json;
 
 ordered_json means_json(const std::array<MetricMean, kMetricCount>& means, bool with_body) {

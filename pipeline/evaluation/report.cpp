@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "manifests/atomic_file.h"
-#include "pipeline/evaluation/csv.h"
+#include "manifests/csv.h"
 #include "pipeline/evaluation/report_values.h"
 #include "pipeline/evaluation/text_table.h"
 #include "pipeline/run/version.h"
@@ -11,6 +11,8 @@
 namespace q3d::pipeline::evaluation {
 namespace {
 
+using manifests::csv_line;
+using manifests::CsvRow;
 using manifests::Reason;
 using nlohmann::ordered_json;
 

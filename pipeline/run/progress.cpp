@@ -36,11 +36,6 @@ void Progress::advance(std::int64_t count, bool from_earlier_run) {
   if (!quiet_ && done_ < total_ && since.count() >= (terminal_ ? 0.2 : 10.0)) draw(false);
 }
 
-void Progress::note(const std::string& line) {
-  const std::lock_guard lock(mutex_);
-  if (!quiet_) fmt::print(stderr, "{}{}\n", terminal_ ? "\r\033[K" : "", line);
-}
-
 void Progress::draw(bool last) {
   drawn_ = Clock::now();
   const double elapsed = std::chrono::duration<double>(drawn_ - start_).count();

@@ -21,7 +21,6 @@ class Progress {
   Progress& operator=(const Progress&) = delete;
 
   void advance(std::int64_t count, bool from_earlier_run = false);
-  void note(const std::string& line);  // a line of its own, above the moving one
 
  private:
   using Clock = std::chrono::steady_clock;

@@ -25,6 +25,7 @@
 #include "model/trainer.h"
 #include "pipeline/run/errors.h"
 #include "pipeline/run/interrupt.h"
+#include "pipeline/run/log.h"
 #include "pipeline/run/progress.h"
 #include "pipeline/run/random.h"
 #include "pipeline/training/rank_agreement.h"
@@ -250,20 +251,19 @@ class Run {
     if (!leads()) return;
     manifests::remove_temporaries(options.out);
     if (options.quiet) return;
-    if (!device_.warning.empty()) fmt::print(stderr, "warning: {}\n", device_.warning);
+    if (!device_.warning.empty()) run::log_warning(device_.warning);
     if (config_.network.precision == "bfloat16" && !model::bfloat16_is_fast(device_.device)) {
-      fmt::print(
-          stderr,
-          "warning: this processor does not multiply in bfloat16 (AVX512_BF16), so convolutions in it are "
-          "about ten times slower than in float32; \"precision\": \"auto\" takes the faster\n");
+      run::log_warning(
+          "this processor does not multiply in bfloat16 (AVX512_BF16), so convolutions in it are about ten "
+          "times slower than in float32; \"precision\": \"auto\" takes the faster");
     }
-    fmt::print(stderr, "training on {} in {}\n", device_.description, config_.network.precision);
+    run::log_info(fmt::format("training on {} in {}", device_.description, config_.network.precision));
     if (ranks_->size() > 1) {
-      fmt::print(stderr, "{} ranks, each with {} of a batch's {} samples\n", ranks_->size(),
-                 config.feed.batch / ranks_->size(), config.feed.batch);
+      run::log_info(fmt::format("{} ranks, each with {} of a batch's {} samples", ranks_->size(),
+                                config.feed.batch / ranks_->size(), config.feed.batch));
     }
     if (stored_) {
-      fmt::print(stderr, "going on at step {} of phase {}\n", position_.step, position_.phase + 1);
+      run::log_info(fmt::format("going on at step {} of phase {}", position_.step, position_.phase + 1));
     }
   }
 

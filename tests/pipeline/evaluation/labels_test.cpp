@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "pipeline/evaluation/csv.h"
+#include "manifests/csv.h"
 
 namespace q3d::pipeline::evaluation {
 namespace {
@@ -69,7 +69,10 @@ TEST(GroupLabels, GroupsThatDoNotOccurHaveNoRow) {
 TEST(LabelsCsv, HasALineACandidate) {
   LabelEvaluation evaluation;
   evaluation.candidates = pool();
-  const std::vector<CsvRow> rows = parse_csv(labels_csv(evaluation));
+  const std::string text = labels_csv(evaluation);
+  manifests::CsvReader reader(text, "labels.csv");
+  std::vector<manifests::CsvRow> rows;
+  for (manifests::CsvRow row; reader.next(row);) rows.push_back(row);
   ASSERT_EQ(rows.size(), 5U);
   EXPECT_EQ(rows[4][0], "d");
   EXPECT_EQ(rows[4][1], "discarded");

@@ -114,7 +114,7 @@ void expect_all_packed(const Pool& pool, const std::string& kind) {
   const dataset::Counts& counts = pool.summary.dataset.counts;
   EXPECT_GT(counts.candidates, 4);
   EXPECT_EQ(counts.retained, counts.candidates);
-  EXPECT_EQ(pool.summary.dataset.labels.at(kind), counts.candidates);
+  EXPECT_EQ(pool.summary.dataset.labels.at(manifests::label_kind_from_string(kind)), counts.candidates);
   EXPECT_EQ(static_cast<std::int64_t>(pool.samples.size()), counts.candidates);
 }
 

@@ -1,0 +1,35 @@
+// The options that several commands share. Their names, checks and usual texts stand here once; a command
+// that means something else by one of them gives its own text.
+#pragma once
+
+#include <CLI/App.hpp>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "filters/bootstrap.h"
+
+namespace q3d::pipeline::cli {
+
+// -c,--config: one or more files that exist. Not required unless the caller says so.
+CLI::Option* config_option(
+    CLI::App& command, std::vector<std::filesystem::path>& configs,
+    const std::string& text = "JSON config file; keys of a later file replace those of an earlier one");
+// -o,--out: a path. Not required unless the caller says so.
+CLI::Option* out_option(CLI::App& command, std::filesystem::path& out, const std::string& text);
+// -t,--threads: a number, 0 or more.
+CLI::Option* threads_option(
+    CLI::App& command, int& threads,
+    const std::string& text = "number of threads that read and decode pictures (0 = all cores)");
+// --json
+CLI::Option* json_flag(CLI::App& command, bool& json,
+                       const std::string& text = "print a machine-readable summary to stdout");
+// -q,--quiet
+CLI::Option* quiet_flag(CLI::App& command, bool& quiet);
+
+// --resamples and --seed of the bootstrap by which two sets of results are compared, -o,--out and --json.
+void comparison_options(CLI::App& command, filters::BootstrapOptions& bootstrap, std::filesystem::path& out,
+                        bool& json);
+
+}  // namespace q3d::pipeline::cli

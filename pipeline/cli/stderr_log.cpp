@@ -1,0 +1,31 @@
+#include "pipeline/cli/stderr_log.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cstdio>
+
+namespace q3d::pipeline::cli {
+namespace {
+
+std::string_view prefix(run::LogLevel level) {
+  switch (level) {
+    case run::LogLevel::info:
+      break;
+    case run::LogLevel::note:
+      return "note: ";
+    case run::LogLevel::warning:
+      return "warning: ";
+  }
+  return "";
+}
+
+}  // namespace
+
+StderrLog::StderrLog() : terminal_(isatty(STDERR_FILENO) != 0) {}
+
+void StderrLog::write(run::LogLevel level, std::string_view line) {
+  fmt::print(stderr, "{}{}{}\n", terminal_ ? "\r\033[K" : "", prefix(level), line);
+}
+
+}  // namespace q3d::pipeline::cli

@@ -1,0 +1,19 @@
+// The library's log on stderr.
+#pragma once
+
+#include "pipeline/run/log.h"
+
+namespace q3d::pipeline::cli {
+
+// Writes "LINE", "note: LINE" or "warning: LINE". On a terminal it first clears the progress line, which
+// draws itself again below.
+class StderrLog : public run::LogSink {
+ public:
+  StderrLog();
+  void write(run::LogLevel level, std::string_view line) override;
+
+ private:
+  bool terminal_;
+};
+
+}  // namespace q3d::pipeline::cli

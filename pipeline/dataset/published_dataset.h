@@ -1,0 +1,73 @@
+// A finished dataset, as whoever reads one sees it: dataset.json, verdicts.csv, the shards, and the tables of
+// the stages as long as they lie beside it. Everything comes as typed values and enumerators.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "manifests/shard.h"
+#include "pipeline/dataset/dataset_manifest.h"
+#include "pipeline/dataset/verdicts.h"
+#include "pipeline/unit/unit_work.h"
+
+namespace q3d::pipeline::dataset {
+
+// What predict was asked and gave, of one unit.
+struct UnitPredictions {
+  std::vector<manifests::SampleRecord> candidates;  // id, image_ref, box and keypoints; nothing else is set
+  std::vector<unit::PredictedSample> samples;       // of the same candidates, in the same order
+};
+
+class PublishedDataset {
+ public:
+  // `given` is a version's folder, or an output folder, of which the newest version is taken. Reads
+  // dataset.json; everything else is opened when it is asked for. Throws std::runtime_error that names the
+  // file if there is no dataset, or one that this toolkit does not know.
+  explicit PublishedDataset(const std::filesystem::path& given);
+
+  const std::filesystem::path& folder() const { return folder_; }
+  // The version's own name, "<name>-<first 12 hex digits of the key>", also when `given` was a link to it.
+  std::string version_name() const;
+  const DatasetManifest& manifest() const { return manifest_; }
+
+  std::filesystem::path verdicts_file() const { return folder_ / "verdicts.csv"; }
+  // All rows in ingest order. Throws like VerdictReader.
+  std::vector<VerdictRow> verdicts() const;
+  // The row of one candidate. Throws std::runtime_error that names the nearest ids if there is none, and like
+  // VerdictReader.
+  VerdictRow verdict(const std::string& id) const;
+  config::Role role(const VerdictRow& row) const;  // throws std::runtime_error for an unknown dataset
+  // Nothing unless the candidate is kept.
+  std::optional<manifests::LabelKind> label_kind(const VerdictRow& row) const;
+
+  std::filesystem::path shard_file(const ShardEntry& shard) const { return folder_ / shard.file; }
+  // The shard of a unit. Throws std::runtime_error if dataset.json lists none.
+  const ShardEntry& shard_of_unit(std::int64_t unit) const;
+  manifests::ShardReader open_shard(const ShardEntry& shard) const;  // throws like ShardReader
+  // The shard's row of a kept candidate. Throws std::runtime_error if the shard holds another one there.
+  manifests::ShardSample sample(const VerdictRow& row) const;
+
+  // The unit of a candidate, and its place there.
+  std::int64_t unit_of(const VerdictRow& row) const;
+  std::size_t place_in_unit(const VerdictRow& row) const;
+  // The output folder that holds the version, and the stages unless the version was moved away.
+  std::filesystem::path output_folder() const;
+  // The tables of one unit. Nothing if the stage's folder is gone or does not hold this unit. A later build
+  // may have made a unit's tables anew for other candidates, so compare the ids of predictions(). Throws
+  // std::runtime_error for a table that is damaged.
+  std::optional<UnitPredictions> predictions(std::int64_t unit) const;
+  std::optional<std::vector<unit::RefinedSample>> refinements(std::int64_t unit) const;
+  std::optional<std::vector<unit::MeasuredLabel>> measures(std::int64_t unit) const;
+
+ private:
+  std::optional<manifests::Table> stage_table(const char* stage, const std::string& key,
+                                              std::int64_t unit) const;
+
+  std::filesystem::path folder_;
+  DatasetManifest manifest_;
+};
+
+}  // namespace q3d::pipeline::dataset

@@ -1,0 +1,26 @@
+// Sentences for people: what a verdict, a reason and a kind of label mean, and what decided about a
+// candidate.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "filters/fidelity.h"
+#include "manifests/verdict.h"
+#include "pipeline/config/role.h"
+
+namespace q3d::pipeline::dataset {
+
+// Each enumerator has a sentence of its own; a new one without a sentence does not compile.
+std::string_view sentence(manifests::Verdict verdict);
+std::string_view sentence(manifests::Reason reason);
+std::string_view sentence(manifests::LabelKind kind);
+
+// What decided about a candidate, in its own numbers. A candidate with a reason is always explained by its
+// reason. `thresholds` are those of its dataset; they are needed where the fidelity rule decided. Throws
+// std::runtime_error if they are missing there.
+std::string why(const manifests::Judgement& judgement, config::Role role,
+                const std::optional<filters::Thresholds>& thresholds);
+
+}  // namespace q3d::pipeline::dataset

@@ -1,0 +1,63 @@
+// verdicts.csv of a published dataset, row by row: what became of every candidate.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "manifests/csv.h"
+#include "manifests/verdict.h"
+
+namespace q3d::pipeline::dataset {
+
+struct VerdictRow {
+  struct LabelPlace {
+    std::int64_t shard = 0;  // number of the unit, and so of the shard
+    std::int64_t row = 0;    // in that shard, from 0
+  };
+
+  std::string id;
+  std::size_t position = 0;  // in ingest order, from 0
+  manifests::Judgement judgement;
+  std::string dataset;
+  std::string split;
+  std::string source;
+  std::string species;
+  manifests::Family family = manifests::Family::none;
+  std::optional<LabelPlace> label;  // of the kept ones
+  std::string image_sha256;
+
+  // Whether the fidelity rule saw a prediction of it: initial_error is a number.
+  bool is_judged() const;
+};
+
+class VerdictReader {
+ public:
+  // Reads the file. Throws std::runtime_error that names it if it cannot be read or lacks a column.
+  explicit VerdictReader(const std::filesystem::path& file);
+  VerdictReader(const VerdictReader&) = delete;
+  VerdictReader& operator=(const VerdictReader&) = delete;
+
+  // The next candidate, or nothing at the end. Throws std::runtime_error that names file and line for a name
+  // that is no enumerator's, for a cell that is no number, and for a row that contradicts itself: a kept
+  // candidate has a row in a shard and no reason, every other has a reason and no row.
+  std::optional<VerdictRow> next();
+
+ private:
+  struct Columns {
+    std::size_t id, verdict, reason, initial_error, final_error, gain, iterations, best_iteration, dataset,
+        split, source, species, family, shard, row, image_sha256, detail;
+  };
+  static Columns find_columns(const manifests::CsvTableReader& table);
+  std::optional<std::int64_t> whole(std::size_t column) const;
+  VerdictRow parse() const;
+
+  std::string text_;
+  manifests::CsvTableReader table_;
+  Columns at_;
+  std::size_t position_ = 0;
+};
+
+}  // namespace q3d::pipeline::dataset
