@@ -10,6 +10,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <stdexcept>
+#include <utility>
 
 namespace q3d::manifests::hdf5 {
 namespace {
@@ -53,6 +54,8 @@ MemoryFile::MemoryFile() : memory_(std::make_unique<Memory>()) {
   check(H5Pset_fapl_core(access.get(), kGrowthBytes, false), "in-memory driver");
   H5FD_file_image_callbacks_t calls = callbacks(memory_.get());
   check(H5Pset_file_image_callbacks(access.get(), &calls), "in-memory driver");
+  // Without a sieve buffer, the library copies values straight into the image.
+  check(H5Pset_sieve_buf_size(access.get(), 0), "in-memory driver");
   check(H5Pset_libver_bounds(access.get(), H5F_LIBVER_V18, H5F_LIBVER_V18), "library version bounds");
   const Handle creation(H5Pcreate(H5P_FILE_CREATE), H5Pclose, "file creation properties");
   check(H5Pset_obj_track_times(creation.get(), false), "file creation properties");
@@ -68,20 +71,41 @@ void MemoryFile::attribute(const std::string& name, hid_t type, const void* valu
   check(H5Awrite(attribute.get(), type, value), name);
 }
 
-void MemoryFile::dataset(const std::string& name, hid_t type, const std::vector<hsize_t>& extents,
-                         const void* data) {
+Handle MemoryFile::empty_dataset(const std::string& name, hid_t type, const std::vector<hsize_t>& extents) {
   const Handle space(H5Screate_simple(static_cast<int>(extents.size()), extents.data(), nullptr), H5Sclose,
                      name);
   const Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose, name);
   check(H5Pset_layout(creation.get(), H5D_CONTIGUOUS), name);
   check(H5Pset_obj_track_times(creation.get(), false), name);
-  const Handle dataset(
-      H5Dcreate2(file_->get(), name.c_str(), type, space.get(), H5P_DEFAULT, creation.get(), H5P_DEFAULT),
-      H5Dclose, name);
+  return {H5Dcreate2(file_->get(), name.c_str(), type, space.get(), H5P_DEFAULT, creation.get(), H5P_DEFAULT),
+          H5Dclose, name};
+}
+
+void MemoryFile::dataset(const std::string& name, hid_t type, const std::vector<hsize_t>& extents,
+                         const void* data) {
+  const Handle dataset = empty_dataset(name, type, extents);
   check(H5Dwrite(dataset.get(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data), name);
 }
 
-std::vector<std::byte> MemoryFile::finish() {
+void MemoryFile::bytes(const std::string& name, std::span<const std::span<const std::byte>> rows) {
+  hsize_t total = 0;
+  for (const auto& row : rows) total += row.size();
+  const Handle dataset = empty_dataset(name, H5T_STD_U8LE, {total});
+  if (total == 0) return;
+  const Handle in_file(H5Dget_space(dataset.get()), H5Sclose, name);
+  hsize_t start = 0;
+  for (const auto& row : rows) {
+    const hsize_t count = row.size();
+    if (count == 0) continue;
+    check(H5Sselect_hyperslab(in_file.get(), H5S_SELECT_SET, &start, nullptr, &count, nullptr), name);
+    const Handle in_memory(H5Screate_simple(1, &count, nullptr), H5Sclose, name);
+    check(H5Dwrite(dataset.get(), H5T_STD_U8LE, in_memory.get(), in_file.get(), H5P_DEFAULT, row.data()),
+          name);
+    start += count;
+  }
+}
+
+FileImage MemoryFile::finish() {
   file_->close("in-memory file");
   std::uint64_t end_of_file = 0;
   if (memory_->allocated >= kEndOfFileField + sizeof(end_of_file)) {
@@ -91,7 +115,7 @@ std::vector<std::byte> MemoryFile::finish() {
     throw std::runtime_error(fmt::format("the HDF5 library left a file of {} bytes in memory for {}",
                                          end_of_file, memory_->allocated));
   }
-  return {memory_->bytes, memory_->bytes + end_of_file};
+  return {std::exchange(memory_->bytes, nullptr), end_of_file};
 }
 
 }  // namespace q3d::manifests::hdf5

@@ -58,9 +58,9 @@ void add_column(Table& table, const ShardColumn& column, const std::vector<Shard
     auto& values = table.text[column.name];
     for (const ShardSample& sample : samples) values.push_back(text->store(sample));
   } else {
-    auto& values = table.blobs[column.name];
+    auto& values = table.blob_views[column.name];
     for (const ShardSample& sample : samples) {
-      values.push_back(sample.*std::get<BytesColumn>(column.content).member);
+      values.emplace_back(sample.*std::get<BytesColumn>(column.content).member);
     }
   }
 }

@@ -51,6 +51,9 @@ struct Table {
   std::map<std::string, NumericColumn> numeric;
   std::map<std::string, std::vector<std::string>> text;
   std::map<std::string, std::vector<std::vector<std::byte>>> blobs;
+  // Further columns of bytes whose bytes lie elsewhere, for a table that is only written: write_table does
+  // not copy them before it composes the file. They must outlive the call. A table that was read has none.
+  std::map<std::string, std::vector<std::span<const std::byte>>> blob_views;
   std::map<std::string, std::string> attributes;  // text attributes of the file's root group
 
   // Adds a column with `values`, which are rows * product(row_shape) numbers. Throws std::logic_error if
@@ -64,7 +67,7 @@ struct Table {
 };
 
 // Writes the table under a temporary name, syncs it and renames it. Returns the file's SHA-256. The file is
-// composed in memory first, which takes about twice the table's size during the call. Throws
+// composed in memory first, which takes about the table's size once more during the call. Throws
 // std::runtime_error that names the path (disk full, no permission, a NUL inside a text). Throws
 // std::logic_error for a malformed table: column lengths that differ from `rows`, names that are not
 // [A-Za-z0-9_]+ or end in "_offsets", or an attribute over 60,000 bytes.

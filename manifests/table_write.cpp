@@ -62,6 +62,13 @@ void check_table(const Table& table) {
       throw std::logic_error(fmt::format("two columns are named {}", name));
     }
   }
+  for (const auto& [name, values] : table.blob_views) {
+    check_name(name);
+    check_rows(name, values.size(), table.rows);
+    if (table.numeric.contains(name) || table.text.contains(name) || table.blobs.contains(name)) {
+      throw std::logic_error(fmt::format("two columns are named {}", name));
+    }
+  }
   for (const auto& [name, value] : table.attributes) {
     if (name == "rows") throw std::logic_error("the attribute name rows is taken");
     if (value.size() > kMaxAttributeBytes || value.find('\0') != std::string::npos) {
@@ -120,18 +127,15 @@ void write_text(hdf5::MemoryFile& file, const std::string& name, const std::vect
 }
 
 void write_blobs(hdf5::MemoryFile& file, const std::string& name,
-                 const std::vector<std::vector<std::byte>>& values) {
+                 const std::vector<std::span<const std::byte>>& values) {
   std::vector<std::int64_t> offsets{0};
   for (const auto& value : values)
     offsets.push_back(offsets.back() + static_cast<std::int64_t>(value.size()));
-  std::vector<std::byte> flat;
-  flat.reserve(static_cast<std::size_t>(offsets.back()));
-  for (const auto& value : values) flat.insert(flat.end(), value.begin(), value.end());
-  file.dataset(name, H5T_STD_U8LE, {flat.size()}, flat.data());
+  file.bytes(name, values);
   file.dataset(name + "_offsets", H5T_STD_I64LE, {offsets.size()}, offsets.data());
 }
 
-std::vector<std::byte> compose(const Table& table) {
+hdf5::FileImage compose(const Table& table) {
   const hdf5::Session session;
   hdf5::MemoryFile file;
   write_attributes(file, table);
@@ -141,22 +145,27 @@ std::vector<std::byte> compose(const Table& table) {
     file.dataset(name, stored_type(column.type), extents, column.data.data());
   }
   for (const auto& [name, values] : table.text) write_text(file, name, values);
-  for (const auto& [name, values] : table.blobs) write_blobs(file, name, values);
+  auto all_blobs = table.blob_views;
+  for (const auto& [name, values] : table.blobs) all_blobs[name] = {values.begin(), values.end()};
+  for (const auto& [name, values] : all_blobs) write_blobs(file, name, values);
   return file.finish();
+}
+
+hdf5::FileImage composed_for(const std::filesystem::path& path, const Table& table) {
+  try {
+    return compose(table);
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(fmt::format("cannot write {}: {}", path.string(), error.what()));
+  }
 }
 
 }  // namespace
 
 std::string write_table(const std::filesystem::path& path, const Table& table) {
   check_table(table);
-  std::vector<std::byte> image;
-  try {
-    image = compose(table);
-  } catch (const std::runtime_error& error) {
-    throw std::runtime_error(fmt::format("cannot write {}: {}", path.string(), error.what()));
-  }
-  write_file_atomically(path, image);
-  return sha256(image);
+  const hdf5::FileImage image = composed_for(path, table);
+  write_file_atomically(path, image.bytes());
+  return sha256(image.bytes());
 }
 
 }  // namespace q3d::manifests

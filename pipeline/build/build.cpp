@@ -11,6 +11,7 @@
 #include "pipeline/run/progress.h"
 #include "pipeline/stages/stage_store.h"
 #include "pipeline/unit/decode.h"
+#include "pipeline/unit/encode.h"
 #include "pipeline/unit/judge.h"
 #include "pipeline/unit/label_measurer.h"
 #include "pipeline/unit/predict.h"
@@ -33,6 +34,7 @@ class UnitBuilder {
         workspace_(workspace),
         predictions_(workspace.out(), "predict", keys.predict),
         refinements_(workspace.out(), "refine", keys.refine),
+        crops_(workspace.out(), "crops", keys.crops),
         shards_(workspace.out(), "shards", keys.shards, &candidates::Unit::label_digest),
         judgements_(workspace.ingest().candidates.size()),
         progress_("candidates", static_cast<std::int64_t>(workspace.ingest().candidates.size()),
@@ -54,21 +56,20 @@ class UnitBuilder {
     flow.read = [this](std::int64_t index) { return read(index); };
     flow.decode = [this](unit::UnitWork& work) { unit::decode_unit(work, config_.shards, &rules_); };
     flow.compute = [this](unit::UnitWork& work) { compute(work); };
+    flow.encode = [this](unit::UnitWork& work) { unit::encode_crops(work, config_.shards); };
     flow.write = [this](unit::UnitWork& work) { write(work); };
     unit::run_units(flow, workspace_.device());
   }
 
   const std::vector<manifests::Judgement>& judgements() const { return judgements_; }
   const stages::StageStore& shards() const { return shards_; }
+  std::int64_t crops_encoded() const { return crops_encoded_; }
 
  private:
   std::shared_ptr<unit::UnitWork> read(std::int64_t index) {
-    const candidates::Ingest& ingest = workspace_.ingest();
-    auto work = std::make_shared<unit::UnitWork>();
-    work->unit = &ingest.units[static_cast<std::size_t>(index)];
-    work->candidates = std::span(ingest.candidates).subspan(work->unit->first, work->unit->count);
+    const std::shared_ptr<unit::UnitWork> work = unit::open_unit(workspace_.ingest(), index);
     if (const auto table = predictions_.load(*work->unit))
-      work->predicted = unit::predicted_from_table(*table);
+      unit::set_predictions(*work, unit::predicted_from_table(*table));
     if (const auto table = refinements_.load(*work->unit)) work->refined = unit::refined_from_table(*table);
     if (measurements_) {
       if (const auto table = measurements_->load(*work->unit))
@@ -78,6 +79,9 @@ class UnitBuilder {
     work->refined_before = work->refined.has_value();
     work->measured_before = work->measured.has_value();
     work->shard_before = shards_.has(*work->unit);
+    if (!work->shard_before) {
+      if (auto table = crops_.load(*work->unit)) work->crops = unit::crops_from_table(std::move(*table));
+    }
     if (work->predicted) unit::judge_unit(*work, rules_);
     return work;
   }
@@ -87,6 +91,7 @@ class UnitBuilder {
     const unit::NetworkSource network = [this]() -> device::Network& { return workspace_.network(); };
     if (!work.predicted) unit::predict_unit(work, network);
     unit::judge_unit(work, rules_);
+    unit::free_unneeded_crops(work, rules_);
     if (!work.refined) {
       unit::refine_unit(work, network, rules_);
       unit::judge_unit(work, rules_);
@@ -102,13 +107,16 @@ class UnitBuilder {
     if (!work.predicted_before) predictions_.save(unit, unit::to_table(work.candidates, *work.predicted));
     if (!work.refined_before) refinements_.save(unit, unit::to_table(*work.refined));
     if (work.measured && !work.measured_before) measurements_->save(unit, unit::to_table(*work.measured));
+    // Before the shard, so that a build which is killed in between has no crop to encode again.
+    if (work.crops_encoded > 0) crops_.save(unit, unit::to_table(work.crops));
+    crops_encoded_ += static_cast<std::int64_t>(work.crops_encoded);
     if (!work.shard_before) write_unit_shard(work);
     std::copy(work.judgements.begin(), work.judgements.end(),
               judgements_.begin() + static_cast<std::ptrdiff_t>(unit.first));
     progress_.advance(static_cast<std::int64_t>(unit.count), work.shard_before);
   }
 
-  void write_unit_shard(const unit::UnitWork& work) {
+  void write_unit_shard(unit::UnitWork& work) {
     const std::vector<manifests::ShardSample> samples = unit::shard_samples(work);
     manifests::ShardHeader header;
     header.dataset = config_.name;
@@ -126,10 +134,12 @@ class UnitBuilder {
   Workspace& workspace_;
   stages::StageStore predictions_;
   stages::StageStore refinements_;
+  stages::StageStore crops_;
   stages::StageStore shards_;
   std::optional<stages::StageStore> measurements_;  // where the rules measure labels
   std::unique_ptr<unit::LabelMeasurer> measurer_;   // made and used on the device's thread
   std::vector<manifests::Judgement> judgements_;    // of every candidate, in ingest order
+  std::int64_t crops_encoded_ = 0;                  // in this run
   run::Progress progress_;
 };
 
@@ -148,6 +158,7 @@ BuildSummary build(const config::BuildConfig& config, const run::RunOptions& opt
   if (!summary.was_up_to_date) {
     UnitBuilder units(config, rules, keys, workspace);
     units.run();
+    summary.crops_encoded = units.crops_encoded();
     const dataset::DatasetInputs inputs{
         &config, &rules, &workspace.ingest(), &workspace.assets(), &keys, workspace.device_key()};
     publish(summary.folder, inputs, units.judgements(), units.shards());

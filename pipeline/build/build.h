@@ -1,6 +1,7 @@
 // The main job: annotated photographs in, a versioned dataset out.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 
@@ -15,6 +16,7 @@ struct BuildSummary {
   std::filesystem::path folder;  // <out>/<name>-<key>
   double seconds = 0.0;
   bool was_up_to_date = false;
+  std::int64_t crops_encoded = 0;  // stored crops that no earlier build had left in the output folder
 };
 
 // Makes <out>/<name>-<key>/ and points <out>/latest at it; goes on where an earlier run ended. Throws

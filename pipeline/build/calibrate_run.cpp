@@ -51,11 +51,9 @@ std::vector<Scored> predict_pool(const config::BuildConfig& config, Workspace& w
   unit::UnitFlow flow;
   flow.units = static_cast<std::int64_t>(ingest.units.size());
   flow.read = [&](std::int64_t index) {
-    auto work = std::make_shared<unit::UnitWork>();
-    work->unit = &ingest.units[static_cast<std::size_t>(index)];
-    work->candidates = std::span(ingest.candidates).subspan(work->unit->first, work->unit->count);
+    const std::shared_ptr<unit::UnitWork> work = unit::open_unit(ingest, index);
     if (const auto table = predictions.load(*work->unit))
-      work->predicted = unit::predicted_from_table(*table);
+      unit::set_predictions(*work, unit::predicted_from_table(*table));
     work->predicted_before = work->predicted.has_value();
     return work;
   };
@@ -67,14 +65,12 @@ std::vector<Scored> predict_pool(const config::BuildConfig& config, Workspace& w
     if (!work.predicted_before)
       predictions.save(*work.unit, unit::to_table(work.candidates, *work.predicted));
     for (std::size_t i = 0; i < work.candidates.size(); ++i) {
-      if (work.candidates[i].exclusion.reason != manifests::Reason::none) continue;
-      const unit::PredictedSample& predicted = (*work.predicted)[i];
-      const double error = unit::initial_error(work.candidates[i], predicted);
-      if (std::isnan(error)) continue;
-      const auto auc =
-          filters::auc(predicted.body.keypoints_2d, unit::crop_keypoints(work.candidates[i].record),
-                       loaders::pictures::kPatchSidePx);
-      scored.push_back({&work.candidates[i], {error, 100.0 * auc.value()}});
+      const candidates::Candidate& candidate = work.candidates[i];
+      const bool is_judged = candidate.role == config::Role::pseudo && !std::isnan(work.errors[i]);
+      if (!is_judged || candidate.exclusion.reason != manifests::Reason::none) continue;
+      const auto auc = filters::auc((*work.predicted)[i].body.keypoints_2d, work.keypoints[i],
+                                    loaders::pictures::kPatchSidePx);
+      scored.push_back({&candidate, {work.errors[i], 100.0 * auc.value()}});
     }
     progress.advance(static_cast<std::int64_t>(work.unit->count), work.predicted_before);
   };
@@ -94,7 +90,8 @@ std::vector<bool> adapt_some(const std::vector<const Scored*>& candidates, const
   std::vector<std::size_t> positions;
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     if (patches[i].empty()) continue;
-    requests.push_back(unit::adapt_request(candidates[i]->candidate->record, patches[i],
+    const manifests::SampleRecord& record = candidates[i]->candidate->record;
+    requests.push_back(unit::adapt_request(record.id, unit::crop_keypoints(record), patches[i],
                                            candidates[i]->score.initial_error, limits, config.guards));
     positions.push_back(i);
   }
@@ -106,9 +103,9 @@ std::vector<bool> adapt_some(const std::vector<const Scored*>& candidates, const
     unit::RefinedSample refined;
     refined.curve = std::move(outcomes[j].curve);
     refined.held_out_curve = std::move(outcomes[j].held_out_curve);
-    passes[positions[j]] = unit::judge_refined(scored.candidate->record, scored.score.initial_error, refined,
-                                               limits, config.guards)
-                               .verdict == manifests::Verdict::refined;
+    passes[positions[j]] =
+        unit::judge_refined(requests[j].keypoints, scored.score.initial_error, refined, limits, config.guards)
+            .verdict == manifests::Verdict::refined;
   }
   return passes;
 }

@@ -12,11 +12,6 @@
 namespace q3d::pipeline::build {
 namespace {
 
-std::size_t flow_threads(int wanted) {
-  if (wanted > 0) return static_cast<std::size_t>(wanted);
-  return std::max<std::size_t>(1, std::thread::hardware_concurrency());
-}
-
 std::filesystem::path made(const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
@@ -28,6 +23,11 @@ std::filesystem::path made(const std::filesystem::path& folder) {
 }
 
 }  // namespace
+
+std::size_t flow_threads(int wanted) {
+  if (wanted > 0) return static_cast<std::size_t>(wanted);
+  return std::max<std::size_t>(1, std::thread::hardware_concurrency());
+}
 
 Workspace::Workspace(const config::BuildConfig& config, const run::RunOptions& options)
     : config_(config),

@@ -17,6 +17,9 @@
 
 namespace q3d::pipeline::build {
 
+// Returns how many threads RunOptions::threads asks for: 0 means one for each core.
+std::size_t flow_threads(int wanted);
+
 class Workspace {
  public:
   // Takes the folder's lock, digests the assets and ingests the datasets. Throws ConfigError,

@@ -70,6 +70,7 @@ nlohmann::ordered_json to_json(const build::BuildSummary& summary) {
           {"content_id", summary.dataset.content_id},
           {"reasons", to_json(summary.dataset.reasons)},
           {"up_to_date", summary.was_up_to_date},
+          {"crops_encoded", summary.crops_encoded},
           {"seconds", summary.seconds}};
 }
 

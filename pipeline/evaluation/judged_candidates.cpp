@@ -3,12 +3,19 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <map>
+#include <span>
 #include <stdexcept>
 
-#include "pipeline/build/publish.h"
+#include "filters/metrics.h"
+#include "manifests/digest.h"
 #include "pipeline/dataset/published_dataset.h"
+#include "pipeline/evaluation/built_version.h"
+#include "pipeline/network/torch_network.h"
 #include "pipeline/run/errors.h"
 #include "pipeline/stages/stage_store.h"
+#include "pipeline/unit/crop_keypoints.h"
 #include "pipeline/unit/unit_tables.h"
 
 namespace q3d::pipeline::evaluation {
@@ -18,48 +25,112 @@ namespace fs = std::filesystem;
 using manifests::Reason;
 using manifests::Verdict;
 
-// Opening a store would make its folder.
-stages::StageStore open_store(const fs::path& out, const std::string& stage, const std::string& key) {
-  const fs::path folder = stages::stage_folder(out, stage, key);
-  if (!fs::exists(folder)) {
-    throw std::runtime_error(
-        fmt::format("{}: the stage's folder is gone; `build` with the same config makes "
-                    "it again",
-                    folder.string()));
+// One stage's tables. Opening a store would make its folder, so a folder that is gone is found first.
+class StageTables {
+ public:
+  StageTables(const fs::path& out, const std::string& stage, const std::string& key)
+      : folder_(stages::stage_folder(out, stage, key)), store_(opened(out, stage, key)) {}
+
+  manifests::Table load(std::int64_t unit) const {
+    if (auto table = store_.load_newest(unit)) return std::move(*table);
+    fail(unit, "not finished");
   }
-  return {out, stage, key};
+  [[noreturn]] void fail(std::int64_t unit, const std::string& what) const {
+    throw std::runtime_error(fmt::format("{}: {}; `build` with the same config makes it again",
+                                         stages::unit_file(folder_, unit).string(), what));
+  }
+
+ private:
+  static stages::StageStore opened(const fs::path& out, const std::string& stage, const std::string& key) {
+    const fs::path folder = stages::stage_folder(out, stage, key);
+    if (!fs::exists(folder)) {
+      throw std::runtime_error(fmt::format(
+          "{}: the stage's folder is gone; `build` with the same config makes it again", folder.string()));
+    }
+    return {out, stage, key};
+  }
+
+  fs::path folder_;
+  stages::StageStore store_;
+};
+
+// The table may be of a later build over other pictures. Then its ids differ, or its L_proj.
+bool is_of(const dataset::VerdictRow& verdict, const manifests::SampleRecord& record,
+           const unit::PredictedSample& predicted) {
+  constexpr double kRounding = 1e-6;  // another processor may round L_proj otherwise
+  if (record.id != verdict.id) return false;
+  const double stated = verdict.judgement.initial_error;
+  if (std::isnan(stated)) return true;
+  if (predicted.failure != Reason::none) return false;
+  const auto error = filters::projection_error(predicted.body.keypoints_2d, unit::crop_keypoints(record));
+  return error && std::abs(*error - stated) <= kRounding * stated + kRounding;
 }
 
-manifests::Table load(const stages::StageStore& store, const candidates::Unit& unit) {
-  if (auto table = store.load(unit)) return std::move(*table);
-  throw std::runtime_error(fmt::format("{}: not finished; `build` with the same config makes it again",
-                                       store.file(unit).string()));
-}
-
-void add_unit(const candidates::Unit& unit, std::span<const candidates::Candidate> candidates,
-              std::span<const dataset::VerdictRow> verdicts,
-              const std::vector<unit::PredictedSample>& predicted,
-              const std::vector<unit::RefinedSample>& refined, JudgedPool& pool) {
-  std::vector<const device::BodyPrediction*> refined_of(unit.count, nullptr);
-  for (const unit::RefinedSample& sample : refined) refined_of.at(sample.sample) = &sample.body;
-  for (std::size_t i = 0; i < unit.count; ++i) {
-    if (candidates[i].role != config::Role::pseudo) continue;
-    if (predicted.at(i).failure != Reason::none) {
-      ++pool.failed;
-      continue;
+class PoolReader {
+ public:
+  PoolReader(const config::BuildConfig& config, const fs::path& out, const stages::StageKeys& keys)
+      : unit_size_(static_cast<std::size_t>(config.shards.unit_size)),
+        predictions_(out, "predict", keys.predict),
+        refinements_(out, "refine", keys.refine) {
+    for (const config::DatasetConfig& each : config.datasets) {
+      roles_[{each.name, each.split}] = each.role;
     }
-    JudgedCandidate& judged = pool.candidates.emplace_back();
-    judged.record = candidates[i].record;
-    judged.verdict = verdicts[i].judgement.verdict;
-    judged.reason = verdicts[i].judgement.reason;
-    judged.predicted = predicted[i].body;
-    if (judged.verdict != Verdict::refined) continue;
-    if (refined_of[i] == nullptr) {
-      throw std::runtime_error(fmt::format("{} is refined and has no refined body", verdicts[i].id));
-    }
-    judged.refined = *refined_of[i];
   }
-}
+
+  void read(std::span<const dataset::VerdictRow> verdicts, JudgedPool& pool) const {
+    for (std::size_t first = 0; first < verdicts.size(); first += unit_size_) {
+      const std::size_t count = std::min(unit_size_, verdicts.size() - first);
+      read_unit(static_cast<std::int64_t>(first / unit_size_), verdicts.subspan(first, count), pool);
+    }
+  }
+
+ private:
+  void read_unit(std::int64_t unit, std::span<const dataset::VerdictRow> verdicts, JudgedPool& pool) const {
+    const manifests::Table table = predictions_.load(unit);
+    const std::vector<unit::PredictedSample> predicted = unit::predicted_from_table(table);
+    if (predicted.size() != verdicts.size()) predictions_.fail(unit, "it was made anew for other candidates");
+    std::map<std::size_t, device::BodyPrediction> refined;
+    for (unit::RefinedSample& sample : unit::refined_from_table(refinements_.load(unit))) {
+      refined[sample.sample] = sample.body;
+    }
+    for (std::size_t i = 0; i < verdicts.size(); ++i) {
+      manifests::SampleRecord record = unit::candidate_from_table(table, i);
+      if (!is_of(verdicts[i], record, predicted[i])) {
+        predictions_.fail(unit, "it was made anew for other candidates or pictures");
+      }
+      if (roles_.at({verdicts[i].dataset, verdicts[i].split}) != config::Role::pseudo) continue;
+      if (predicted[i].failure != Reason::none) {
+        ++pool.failed;
+        continue;
+      }
+      pool.candidates.push_back(judged(verdicts[i], std::move(record), predicted[i]));
+      if (verdicts[i].judgement.verdict != Verdict::refined) continue;
+      const auto body = refined.find(i);
+      if (body == refined.end()) refinements_.fail(unit, verdicts[i].id + " is refined and has no body here");
+      pool.candidates.back().refined = body->second;
+    }
+  }
+
+  static JudgedCandidate judged(const dataset::VerdictRow& verdict, manifests::SampleRecord record,
+                                const unit::PredictedSample& predicted) {
+    JudgedCandidate candidate;
+    candidate.record = std::move(record);
+    candidate.record.dataset = verdict.dataset;
+    candidate.record.split = verdict.split;
+    candidate.image_width_px = predicted.image_width_px;
+    candidate.image_height_px = predicted.image_height_px;
+    candidate.has_mask = predicted.has_mask;
+    candidate.verdict = verdict.judgement.verdict;
+    candidate.reason = verdict.judgement.reason;
+    candidate.predicted = predicted.body;
+    return candidate;
+  }
+
+  std::size_t unit_size_;
+  StageTables predictions_;
+  StageTables refinements_;
+  std::map<std::pair<std::string, std::string>, config::Role> roles_;  // by dataset and split
+};
 
 }  // namespace
 
@@ -68,42 +139,20 @@ const device::BodyPrediction* JudgedCandidate::label() const {
   return verdict == Verdict::retained ? &predicted : nullptr;
 }
 
-JudgedPool read_judged_pool(const config::BuildConfig& config, build::Workspace& workspace) {
+JudgedPool read_judged_pool(const config::BuildConfig& config, const fs::path& out) {
   if (!config::needs_network(config)) {
     throw run::ConfigError(
         "no dataset of the config has the role \"pseudo\": there are no pseudo labels to judge");
   }
-  const candidates::Ingest& ingest = workspace.ingest();
-  const stages::StageKeys keys = stages::stage_keys(config, config::judging_rules(config), ingest,
-                                                    workspace.assets(), workspace.device_key());
-  const fs::path folder = build::version_folder(workspace.out(), config, keys);
-  if (!build::is_published(folder, keys)) {
-    throw std::runtime_error(
-        fmt::format("{}: there is no finished dataset of this config; run `build` with "
-                    "the same config and output folder first",
-                    folder.string()));
-  }
-  const dataset::PublishedDataset published(folder);
-  const std::vector<dataset::VerdictRow> verdicts = published.verdicts();
-  const bool fits =
-      std::equal(verdicts.begin(), verdicts.end(), ingest.candidates.begin(), ingest.candidates.end(),
-                 [](const dataset::VerdictRow& verdict, const candidates::Candidate& each) {
-                   return verdict.id == each.record.id;
-                 });
-  if (!fits) {
-    throw std::runtime_error((folder / "verdicts.csv").string() + ": lists other candidates than the config");
-  }
-  const stages::StageStore predictions = open_store(workspace.out(), "predict", keys.predict);
-  const stages::StageStore refinements = open_store(workspace.out(), "refine", keys.refine);
+  manifests::DigestCache digests(out / "digests.txt");
+  const stages::StageKeys keys =
+      stages::keys_of_config(config, config::judging_rules(config), stages::digest_assets(config, digests),
+                             network::device_key(config.network));
+  const BuiltVersion version = find_built_version(config, keys, out);
   JudgedPool pool;
-  pool.dataset = folder.filename().string();
-  pool.content_id = published.manifest().content_id;
-  for (const candidates::Unit& unit : ingest.units) {
-    add_unit(unit, std::span(ingest.candidates).subspan(unit.first, unit.count),
-             std::span(verdicts).subspan(unit.first, unit.count),
-             unit::predicted_from_table(load(predictions, unit)),
-             unit::refined_from_table(load(refinements, unit)), pool);
-  }
+  pool.dataset = version.folder.filename().string();
+  pool.content_id = version.content_id;
+  PoolReader(config, out, keys).read(dataset::PublishedDataset(version.folder).verdicts(), pool);
   return pool;
 }
 

@@ -1,16 +1,23 @@
 // What a build made of its candidates, read back from its output folder: verdicts as published, the network's
-// predictions and the refined bodies.
+// predictions and the refined bodies. Neither annotation files nor pictures are read.
 #pragma once
 
+#include <filesystem>
 #include <optional>
+#include <string>
 #include <vector>
 
-#include "pipeline/build/workspace.h"
+#include "manifests/verdict.h"
+#include "pipeline/config/build_config.h"
+#include "pipeline/device/network.h"
 
 namespace q3d::pipeline::evaluation {
 
 struct JudgedCandidate {
-  manifests::SampleRecord record;
+  manifests::SampleRecord record;  // id, dataset, split, image_ref, box and keypoints; nothing else
+  int image_width_px = 0;
+  int image_height_px = 0;
+  bool has_mask = false;  // the annotation file names a mask that could be used
   manifests::Verdict verdict = manifests::Verdict::failed;
   manifests::Reason reason = manifests::Reason::none;
   device::BodyPrediction predicted;               // before refinement
@@ -27,8 +34,9 @@ struct JudgedPool {
   std::string content_id;
 };
 
-// Throws ConfigError when the config has no dataset of role `pseudo` or no thresholds, and std::runtime_error
-// when its dataset has not been published in workspace.out(), or a stage's files are gone.
-JudgedPool read_judged_pool(const config::BuildConfig& config, build::Workspace& workspace);
+// Reads the pool of the dataset that `config` has built in `out`. Throws ConfigError when the config has no
+// dataset of role `pseudo` or no thresholds, and std::runtime_error when its dataset has not been published
+// in `out`, when a stage's files are gone, or when they were made anew for other candidates or pictures.
+JudgedPool read_judged_pool(const config::BuildConfig& config, const std::filesystem::path& out);
 
 }  // namespace q3d::pipeline::evaluation

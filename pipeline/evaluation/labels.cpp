@@ -1,11 +1,17 @@
 #include "pipeline/evaluation/labels.h"
 
 #include <fmt/format.h>
+#include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 
+#include <map>
 #include <stdexcept>
 
 #include "manifests/digest.h"
+#include "manifests/lock.h"
+#include "pipeline/build/workspace.h"
+#include "pipeline/candidates/body_check.h"
+#include "pipeline/candidates/configured_dataset.h"
 #include "pipeline/evaluation/hidden_truth.h"
 #include "pipeline/network/torch_bodies.h"
 #include "pipeline/run/interrupt.h"
@@ -27,7 +33,45 @@ struct Truths {
   std::vector<std::optional<manifests::Keypoints>> keypoints;
 };
 
-Truths read_truths(const JudgedPool& pool, const LabelOptions& options, LabelEvaluation& evaluation) {
+// Whether something is to be measured that only the annotation files know.
+bool needs_annotations(const JudgedPool& pool, const Truths& truths) {
+  for (std::size_t i = 0; i < truths.records.size(); ++i) {
+    const manifests::SampleRecord& record = truths.records[i];
+    if (!record.truth || (pool.candidates[i].has_mask && record.mask_path.empty())) return true;
+  }
+  return false;
+}
+
+// Fills in the bodies and masks of the annotation files where the truth files gave none.
+void add_annotated(const config::BuildConfig& config, std::vector<manifests::SampleRecord>& records) {
+  std::map<std::string, manifests::SampleRecord> annotated;  // by id
+  for (const config::DatasetConfig& options : config.datasets) {
+    if (options.role != config::Role::pseudo) continue;
+    run::throw_if_interrupted();
+    std::vector<manifests::SampleRecord> loaded = candidates::load_configured(options).records;
+    if (!options.body_model.empty()) {
+      candidates::check_bodies(*network::load_body_meshes(options.body_model), options.keypoints_3d_of_body,
+                               loaded);
+    }
+    for (manifests::SampleRecord& record : loaded) {
+      const std::string id = record.id;
+      annotated.emplace(id, std::move(record));
+    }
+  }
+  for (manifests::SampleRecord& record : records) {
+    const auto found = annotated.find(record.id);
+    if (found == annotated.end()) {
+      throw std::runtime_error(fmt::format(
+          "{} is in the dataset and not in its annotation file any more; `build` with the same config again",
+          record.id));
+    }
+    if (!record.truth) record.truth = found->second.truth;
+    if (record.mask_path.empty()) record.mask_path = found->second.mask_path;
+  }
+}
+
+Truths read_truths(const JudgedPool& pool, const config::BuildConfig& config, const LabelOptions& options,
+                   LabelEvaluation& evaluation) {
   Truths truths;
   for (const JudgedCandidate& candidate : pool.candidates) truths.records.push_back(candidate.record);
   truths.keypoints.resize(truths.records.size());
@@ -41,6 +85,7 @@ Truths read_truths(const JudgedPool& pool, const LabelOptions& options, LabelEva
     }
     evaluation.truth_sha256.push_back(manifests::sha256_file(file));
   }
+  if (needs_annotations(pool, truths)) add_annotated(config, truths.records);
   return truths;
 }
 
@@ -54,9 +99,10 @@ class LabelMeasurer {
     std::vector<double> mask_areas(count, 0.0);
     tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
       if (run::interrupted()) return;
-      mask_areas[i] = unit::decode_sample(truths_.records[first + i],
-                                          {.patch = true, .stored_crop = false, .mask_area = true}, {})
-                          .mask_area_px;
+      const manifests::SampleRecord& record = truths_.records[first + i];
+      const JudgedCandidate& candidate = pool_.candidates[first + i];
+      mask_areas[i] = unit::mask_area_px(record.mask_path, record.box, candidate.image_width_px,
+                                         candidate.image_height_px);
     });
     run::throw_if_interrupted();
     std::vector<Target> targets;
@@ -180,13 +226,15 @@ std::vector<LabelRow> group_labels(const std::vector<MeasuredCandidate>& candida
 }
 
 LabelEvaluation evaluate_labels(const config::BuildConfig& config, const LabelOptions& options) {
-  build::Workspace workspace(config, options.run);
-  const JudgedPool pool = read_judged_pool(config, workspace);
+  const tbb::global_control threads(tbb::global_control::max_allowed_parallelism,
+                                    build::flow_threads(options.run.threads));
+  const manifests::FolderLock lock(options.run.out);
+  const JudgedPool pool = read_judged_pool(config, options.run.out);
   LabelEvaluation evaluation;
   evaluation.dataset = pool.dataset;
   evaluation.content_id = pool.content_id;
   evaluation.failed = pool.failed;
-  const Truths truths = read_truths(pool, options, evaluation);
+  const Truths truths = read_truths(pool, config, options, evaluation);
   const std::unique_ptr<device::BodyMeshes> meshes = network::load_body_meshes(config.network.smal_asset);
   LabelMeasurer measurer(pool, truths, *meshes);
   run::Progress progress("measured", static_cast<std::int64_t>(pool.candidates.size()), options.run.quiet);

@@ -56,8 +56,9 @@ struct LabelOptions {
   std::filesystem::path masks;               // folder that its mask paths start from; empty: not used
 };
 
-// Judges the dataset that `config` has built in options.run.out. Throws ConfigError, std::runtime_error,
-// Interrupted.
+// Judges the dataset that `config` has built in options.run.out. Reads it from that folder: no picture is
+// read, and annotation files only where the truth files lack a body or a mask. Throws ConfigError,
+// std::runtime_error, Interrupted.
 LabelEvaluation evaluate_labels(const config::BuildConfig& config, const LabelOptions& options);
 
 // The rows of the groups that occur.

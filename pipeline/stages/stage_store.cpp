@@ -42,6 +42,18 @@ std::optional<manifests::Table> StageStore::load(const candidates::Unit& unit) c
   return manifests::read_table(file(unit));
 }
 
+std::optional<manifests::Table> StageStore::load_newest(std::int64_t unit) const {
+  candidates::Unit newest;
+  newest.index = unit;
+  {
+    const std::lock_guard lock(mutex_);
+    const auto found = journal_.entries().find(unit);
+    if (found == journal_.entries().end()) return std::nullopt;
+    newest.*digest_ = found->second.input_digest;
+  }
+  return load(newest);
+}
+
 void StageStore::save(const candidates::Unit& unit, const manifests::Table& table) {
   save(unit, table.rows,
        [&](const std::filesystem::path& path) { return manifests::write_table(path, table); });

@@ -26,6 +26,9 @@ class StageStore {
   bool has(const candidates::Unit& unit) const;
   std::optional<manifests::Table> load(
       const candidates::Unit& unit) const;  // throws std::runtime_error on a damaged file
+  // The newest table of a unit, whatever its input was, for readers that do not know the candidates. The
+  // caller must check that the table is of the candidates that it expects.
+  std::optional<manifests::Table> load_newest(std::int64_t unit) const;
   void save(const candidates::Unit& unit, const manifests::Table& table);
   // Records a file that `write` makes under the given path and whose SHA-256 it returns.
   void save(const candidates::Unit& unit, std::int64_t rows,

@@ -22,6 +22,7 @@ constexpr int kPredictCode = 2;
 constexpr int kFidelityCode = 1;
 constexpr int kRefineCode = 1;
 constexpr int kMeasureCode = 1;
+constexpr int kCropsCode = 1;
 constexpr int kShardsCode = 1;
 
 std::string key_of(const char* stage, int code, json parts) {
@@ -116,11 +117,18 @@ std::string predict_key(const config::BuildConfig& config, const AssetDigests& a
   return key_of("predict", kPredictCode, std::move(parts));
 }
 
-StageKeys stage_keys(const config::BuildConfig& config, const config::JudgingRules& rules,
-                     const candidates::Ingest& ingest, const AssetDigests& assets,
-                     const std::string& device_key) {
+std::string crops_key(const config::ShardConfig& shards) {
+  json parts = {{"images", shards.images},
+                {"crop_scale", shards.crop_scale},
+                {"crop_min_side_px", shards.crop_min_side_px},
+                {"unit_size", shards.unit_size}};
+  if (shards.images == "jpeg") parts["jpeg_quality"] = shards.jpeg_quality;
+  return key_of("crops", kCropsCode, std::move(parts));
+}
+
+StageKeys keys_of_config(const config::BuildConfig& config, const config::JudgingRules& rules,
+                         const AssetDigests& assets, const std::string& device_key) {
   StageKeys keys;
-  keys.ingest = ingest_key(config, ingest);
   keys.predict = predict_key(config, assets, device_key);
   const bool judges = config::needs_network(config);
   json fidelity = judges ? fidelity_parts(rules) : json::object();
@@ -138,7 +146,16 @@ StageKeys stage_keys(const config::BuildConfig& config, const config::JudgingRul
     shards["measure"] = keys.measure;
     shards["bounds"] = bounds_json(config.guards);
   }
+  keys.crops = crops_key(config.shards);
   keys.shards = key_of("shards", kShardsCode, std::move(shards));
+  return keys;
+}
+
+StageKeys stage_keys(const config::BuildConfig& config, const config::JudgingRules& rules,
+                     const candidates::Ingest& ingest, const AssetDigests& assets,
+                     const std::string& device_key) {
+  StageKeys keys = keys_of_config(config, rules, assets, device_key);
+  keys.ingest = ingest_key(config, ingest);
   keys.dataset =
       key_of("dataset", 1, {{"ingest", keys.ingest}, {"shards", keys.shards}, {"version", config.version}});
   return keys;

@@ -38,12 +38,17 @@ struct StageKeys {
   std::string fidelity;
   std::string refine;
   std::string measure;  // what the guards' bounds look at; empty when none is on
+  std::string crops;    // the bytes of stored crops; thresholds and network have no part in it
   std::string shards;
   std::string dataset;  // the version: everything above
 };
 
 std::string predict_key(const config::BuildConfig& config, const AssetDigests& assets,
                         const std::string& device_key);
+std::string crops_key(const config::ShardConfig& shards);
+// The keys that do not depend on the candidates: all but `ingest` and `dataset`, which stay empty.
+StageKeys keys_of_config(const config::BuildConfig& config, const config::JudgingRules& rules,
+                         const AssetDigests& assets, const std::string& device_key);
 StageKeys stage_keys(const config::BuildConfig& config, const config::JudgingRules& rules,
                      const candidates::Ingest& ingest, const AssetDigests& assets,
                      const std::string& device_key);

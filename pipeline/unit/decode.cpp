@@ -5,7 +5,6 @@
 
 #include "loaders/pictures/box.h"
 #include "loaders/pictures/crop.h"
-#include "loaders/pictures/encode.h"
 #include "loaders/pictures/image.h"
 #include "loaders/pictures/stored_crop.h"
 #include "pipeline/run/interrupt.h"
@@ -15,16 +14,9 @@ namespace {
 
 using manifests::Reason;
 
-void store_crop(DecodedSample& sample, const cv::Mat& rgb, const cv::Mat& mask,
-                const loaders::pictures::SquareBox& box, const config::ShardConfig& shards) {
-  const loaders::pictures::StoredCrop crop =
-      loaders::pictures::make_stored_crop(rgb, mask, box, shards.crop_scale, shards.crop_min_side_px);
-  sample.stored_side_px = crop.rgb.cols;
-  sample.stored_from_image = crop.from_image;
-  if (shards.images == "reference") return;
-  sample.stored_crop = shards.images == "png" ? loaders::pictures::encode_png(crop.rgb)
-                                              : loaders::pictures::encode_jpeg(crop.rgb, shards.jpeg_quality);
-  if (!crop.mask.empty()) sample.stored_mask = loaders::pictures::encode_png(crop.mask);
+// As in the official evaluator, the area is the sum of the warped mask / 255.
+double area_px(const cv::Mat& mask) {
+  return cv::sum(mask)[0] / 255.0;
 }
 
 }  // namespace
@@ -60,15 +52,28 @@ DecodedSample decode_sample(const manifests::SampleRecord& record, Wanted want,
     const loaders::pictures::Patch patch =
         loaders::pictures::make_patch(image.rgb, warps_mask ? mask.silhouette : cv::Mat(), square);
     sample.patch.assign(patch.rgb.datastart, patch.rgb.dataend);
-    // As in the official evaluator, the area is the sum of the warped mask / 255, soft edges included.
-    if (patch.has_mask) sample.mask_area_px = cv::sum(patch.mask)[0] / 255.0;
+    if (patch.has_mask) sample.mask_area_px = area_px(patch.mask);
     if (want.patch_mask && patch.has_mask) {
       sample.patch_mask.assign(patch.mask.datastart, patch.mask.dataend);
     }
   }
-  if (want.stored_crop) store_crop(sample, image.rgb, has_mask ? mask.silhouette : cv::Mat(), square, shards);
-  sample.decoded = true;
+  if (want.stored_crop) {
+    sample.stored_crop =
+        loaders::pictures::make_stored_crop(image.rgb, has_mask ? mask.silhouette : cv::Mat(), square,
+                                            shards.crop_scale, shards.crop_min_side_px);
+  }
   return sample;
+}
+
+double mask_area_px(const std::string& mask_path, const manifests::Box& box, int image_width_px,
+                    int image_height_px) {
+  const loaders::pictures::DecodedMask mask = loaders::pictures::decode_mask(mask_path);
+  if (mask.silhouette.empty() || mask.silhouette.size() != cv::Size(image_width_px, image_height_px))
+    return 0.0;
+  const cv::Mat blank = cv::Mat::zeros(mask.silhouette.size(), CV_8UC3);
+  const loaders::pictures::Patch patch =
+      loaders::pictures::make_patch(blank, mask.silhouette, loaders::pictures::square_box(box));
+  return patch.has_mask ? area_px(patch.mask) : 0.0;
 }
 
 void decode_unit(UnitWork& work, const config::ShardConfig& shards, const config::JudgingRules* rules) {
@@ -79,6 +84,14 @@ void decode_unit(UnitWork& work, const config::ShardConfig& shards, const config
       work.decoded[i] = decode_sample(work.candidates[i].record, *want, shards);
     }
   });
+}
+
+void free_unneeded_crops(UnitWork& work, const config::JudgingRules& rules) {
+  for (std::size_t i = 0; i < work.decoded.size(); ++i) {
+    if (!work.decoded[i].stored_crop) continue;
+    const auto want = wanted(picture_facts(work, i, &rules));
+    if (!want || !want->stored_crop) work.decoded[i].stored_crop.reset();
+  }
 }
 
 }  // namespace q3d::pipeline::unit

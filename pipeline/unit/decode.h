@@ -1,6 +1,8 @@
 // The step that decodes the pictures of a unit.
 #pragma once
 
+#include <string>
+
 #include "pipeline/config/judging_rules.h"
 #include "pipeline/unit/picture_needs.h"
 #include "pipeline/unit/unit_work.h"
@@ -11,8 +13,16 @@ namespace q3d::pipeline::unit {
 DecodedSample decode_sample(const manifests::SampleRecord& record, Wanted want,
                             const config::ShardConfig& shards);
 
+// Returns the area of a mask in the network's crop, in px of the crop, soft edges included. It is 0 if the
+// mask is absent, unreadable, no silhouette, or not of the picture's size. Needs no picture.
+double mask_area_px(const std::string& mask_path, const manifests::Box& box, int image_width_px,
+                    int image_height_px);
+
 // Fills work.decoded, in parallel, with what the steps to come need of each picture (picture_needs.h).
 // `rules` may be null when only predictions are wanted; then no stored crops are made.
 void decode_unit(UnitWork& work, const config::ShardConfig& shards, const config::JudgingRules* rules);
+
+// Frees the pixels of stored crops that will not be encoded: those of candidates that a verdict has dropped.
+void free_unneeded_crops(UnitWork& work, const config::JudgingRules& rules);
 
 }  // namespace q3d::pipeline::unit

@@ -2,10 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <limits>
-
-#include "filters/metrics.h"
-#include "pipeline/unit/annotated_body.h"
 #include "pipeline/unit/crop_keypoints.h"
 
 namespace q3d::pipeline::unit {
@@ -34,23 +30,20 @@ manifests::Judgement nothing_to_hold_out(const RefinedSample& refined) {
   return judgement;
 }
 
-// Keeps a label in which the network has no part.
-manifests::Judgement judge_annotated(const candidates::Candidate& candidate,
-                                     const device::BodyPrediction& body) {
+// Keeps a label in which the network has no part. `error` is L_proj of its body, or NaN.
+manifests::Judgement judge_annotated(double error) {
   manifests::Judgement judgement;
   judgement.verdict = Verdict::retained;
-  if (has_projection(body.keypoints_2d)) {
-    judgement.final_error = filters::projection_error(body.keypoints_2d, crop_keypoints(candidate.record))
-                                .value_or(std::numeric_limits<double>::quiet_NaN());
-  }
+  judgement.final_error = error;
   return judgement;
 }
 
-manifests::Judgement judge_predicted(const candidates::Candidate& candidate, const PredictedSample& predicted,
-                                     const config::JudgingRules& rules) {
+manifests::Judgement judge_predicted(const UnitWork& work, std::size_t i, const config::JudgingRules& rules) {
+  const PredictedSample& predicted = (*work.predicted)[i];
   if (predicted.failure != Reason::none) return failed(predicted.failure, predicted.detail);
-  if (candidate.role != config::Role::pseudo) return judge_annotated(candidate, predicted.body);
-  return filters::judge_initial(initial_error(candidate, predicted), rules.of(candidate.record.dataset));
+  const candidates::Candidate& candidate = work.candidates[i];
+  if (candidate.role != config::Role::pseudo) return judge_annotated(work.errors[i]);
+  return filters::judge_initial(work.errors[i], rules.of(candidate.record.dataset));
 }
 
 // Discards a candidate that the user or a test split excludes. It keeps its numbers; a failed one stays
@@ -64,20 +57,13 @@ void apply_exclusion(const candidates::Exclusion& exclusion, manifests::Judgemen
 
 }  // namespace
 
-double initial_error(const candidates::Candidate& candidate, const PredictedSample& predicted) {
-  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-  if (predicted.failure != Reason::none || candidate.role != config::Role::pseudo) return kNone;
-  return filters::projection_error(predicted.body.keypoints_2d, crop_keypoints(candidate.record))
-      .value_or(kNone);
-}
-
-manifests::Judgement judge_refined(const manifests::SampleRecord& record, double error,
+manifests::Judgement judge_refined(const device::CropKeypoints& keypoints, double error,
                                    const RefinedSample& refined, const filters::Thresholds& thresholds,
                                    const config::GuardConfig& guards) {
   if (refined.curve.empty()) {
     return failed(Reason::prediction_not_finite, "nothing could be measured in adaptation");
   }
-  const int visible = visible_keypoints(crop_keypoints(record));
+  const int visible = visible_keypoints(keypoints);
   if (guards.held_out_share > 0.0 && refined.held_out_curve.empty()) return nothing_to_hold_out(refined);
   manifests::Judgement judgement =
       guards.held_out_share > 0.0 ? filters::judge_held_out(refined.curve, refined.held_out_curve, thresholds)
@@ -96,14 +82,13 @@ manifests::Judgement judge_refined(const manifests::SampleRecord& record, double
 void judge_unit(UnitWork& work, const config::JudgingRules& rules) {
   work.judgements.assign(work.candidates.size(), {});
   for (std::size_t i = 0; i < work.candidates.size(); ++i) {
-    work.judgements[i] = judge_predicted(work.candidates[i], (*work.predicted)[i], rules);
+    work.judgements[i] = judge_predicted(work, i, rules);
   }
   if (work.refined) {
     for (const RefinedSample& refined : *work.refined) {
-      const candidates::Candidate& candidate = work.candidates[refined.sample];
-      const double error = initial_error(candidate, (*work.predicted)[refined.sample]);
-      work.judgements[refined.sample] =
-          judge_refined(candidate.record, error, refined, rules.of(candidate.record.dataset), rules.guards);
+      const std::size_t i = refined.sample;
+      work.judgements[i] = judge_refined(work.keypoints[i], work.errors[i], refined,
+                                         rules.of(work.candidates[i].record.dataset), rules.guards);
     }
   }
   if (work.measured) {

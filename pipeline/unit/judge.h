@@ -7,20 +7,17 @@
 
 namespace q3d::pipeline::unit {
 
-// Returns L_proj of a candidate's prediction in crop units. It is NaN if the candidate failed or if its role
-// is not `pseudo`.
-double initial_error(const candidates::Candidate& candidate, const PredictedSample& predicted);
-
 // Returns the verdict on a candidate that was adapted by adapt_request (refine.h), before any bound is
-// applied. It depends on the candidate's curve, and on the held-out curve where there is one.
-manifests::Judgement judge_refined(const manifests::SampleRecord& record, double error,
+// applied. It depends on the candidate's curve, and on the held-out curve where there is one. `error` is
+// L_proj of the prediction in crop units.
+manifests::Judgement judge_refined(const device::CropKeypoints& keypoints, double error,
                                    const RefinedSample& refined, const filters::Thresholds& thresholds,
                                    const config::GuardConfig& guards);
 
 // Fills work.judgements from what is known: failures, bands, adaptation curves and measured labels where
 // there are any. A label that does not come from the network is retained as it is; if it has a projection,
-// its L_proj becomes the final error. Throws std::out_of_range for a pseudo label whose dataset has no
-// thresholds.
+// its L_proj becomes the final error. Needs work.errors beside work.predicted. Throws std::out_of_range for a
+// pseudo label whose dataset has no thresholds.
 void judge_unit(UnitWork& work, const config::JudgingRules& rules);
 
 // Returns whether the candidate's label goes into the dataset.

@@ -99,9 +99,9 @@ std::vector<MeasuredLabel> LabelMeasurer::measure(const UnitWork& work) const {
   tbb::parallel_for(std::size_t{0}, labels.size(), [&](std::size_t i) {
     const std::size_t sample = labels[i].sample;
     measured[i].sample = sample;
-    measured[i].measures = measure_one(crop_keypoints(work.candidates[sample].record), *labels[i].body,
-                                       meshes.empty() ? nullptr : &meshes[i],
-                                       work.decoded.empty() ? nullptr : &work.decoded[sample]);
+    measured[i].measures =
+        measure_one(work.keypoints[sample], *labels[i].body, meshes.empty() ? nullptr : &meshes[i],
+                    work.decoded.empty() ? nullptr : &work.decoded[sample]);
   });
   return measured;
 }

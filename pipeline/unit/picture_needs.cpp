@@ -37,10 +37,9 @@ Standing standing_of(const UnitWork& work, std::size_t i, const config::JudgingR
   const PredictedSample& predicted = (*work.predicted)[i];
   if (rules == nullptr || predicted.failure != Reason::none) return Standing::finished;
   if (candidate.role != config::Role::pseudo) return Standing::may_be_kept;
-  const double error = initial_error(candidate, predicted);
-  if (std::isnan(error)) return Standing::finished;
+  if (std::isnan(work.errors[i])) return Standing::finished;
   if (work.refined) return is_kept(work.judgements[i]) ? Standing::may_be_kept : Standing::finished;
-  switch (filters::band(error, rules->of(candidate.record.dataset))) {
+  switch (filters::band(work.errors[i], rules->of(candidate.record.dataset))) {
     case Band::retain:
       return Standing::may_be_kept;
     case Band::refine:
@@ -56,7 +55,7 @@ Standing standing_of(const UnitWork& work, std::size_t i, const config::JudgingR
 std::optional<Wanted> wanted(const PictureFacts& facts) {
   const Needs& needs = kNeeds.at(static_cast<std::size_t>(facts.standing));
   const Wanted want{.patch = needs.patch && facts.is_pseudo,
-                    .stored_crop = needs.stored_crop && facts.goes_to_shard,
+                    .stored_crop = needs.stored_crop && facts.lacks_crop,
                     .patch_mask = needs.patch_mask && facts.measures_mask};
   const bool needs_part = want.patch || want.stored_crop || want.patch_mask;
   return needs.decoding || needs_part ? std::optional(want) : std::nullopt;
@@ -68,7 +67,8 @@ PictureFacts picture_facts(const UnitWork& work, std::size_t i, const config::Ju
   facts.standing = standing_of(work, i, rules);
   facts.is_pseudo = candidate.role == config::Role::pseudo;
   if (rules == nullptr) return facts;
-  facts.goes_to_shard = !work.shard_before && candidate.exclusion.reason == Reason::none;
+  facts.lacks_crop =
+      !work.shard_before && candidate.exclusion.reason == Reason::none && find_crop(work, i) == nullptr;
   facts.measures_mask = facts.is_pseudo && rules->guards.mask_iou_min > 0.0 && !work.measured &&
                         !candidate.record.mask_path.empty();
   return facts;

@@ -22,16 +22,17 @@ enum class Standing : std::uint8_t {
 struct PictureFacts {
   Standing standing = Standing::finished;
   bool is_pseudo = false;      // its label comes from the network
-  bool goes_to_shard = false;  // the unit's shard is still to be made, and nothing leaves the candidate out
+  bool lacks_crop = false;     // the unit's shard is still to be made, the candidate may be in it, and its
+                               // stored crop has not been encoded by any build
   bool measures_mask = false;  // its label is still to be measured against its mask
 };
 
 // Parts of a picture.
 struct Wanted {
-  bool patch = false;  // the network's crop
-  bool stored_crop = false;
-  bool mask_area = false;   // of the patch; comes with it
-  bool patch_mask = false;  // likewise
+  bool patch = false;        // the network's crop
+  bool stored_crop = false;  // pixels; encode.h encodes them
+  bool mask_area = false;    // of the patch; comes with it
+  bool patch_mask = false;   // likewise
 };
 
 // Returns the parts that the steps to come need. It is empty if the picture need not be decoded.

@@ -51,7 +51,7 @@ void predict_unit(UnitWork& work, const NetworkSource& network) {
       sample.detail = "the network's output holds NaN or infinity";
     }
   }
-  work.predicted = std::move(samples);
+  set_predictions(work, std::move(samples));
 }
 
 }  // namespace q3d::pipeline::unit

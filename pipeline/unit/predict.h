@@ -6,9 +6,10 @@
 
 namespace q3d::pipeline::unit {
 
-// Fills work.predicted. The candidates of role `pseudo` whose pictures were decoded get the network's
-// prediction, in batches inside the unit; a prediction that is not finite is a failed sample. The other
-// candidates get the body that their annotation gives, or none. Does nothing if work.predicted is there.
+// Fills work.predicted and work.errors. The candidates of role `pseudo` whose pictures were decoded get the
+// network's prediction, in batches inside the unit; a prediction that is not finite is a failed sample. The
+// other candidates get the body that their annotation gives, or none. Does nothing if work.predicted is
+// there.
 void predict_unit(UnitWork& work, const NetworkSource& network);
 
 }  // namespace q3d::pipeline::unit

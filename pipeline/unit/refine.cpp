@@ -4,16 +4,15 @@
 
 #include "filters/keypoint_choice.h"
 #include "pipeline/unit/crop_keypoints.h"
-#include "pipeline/unit/judge.h"
 
 namespace q3d::pipeline::unit {
 
-device::AdaptRequest adapt_request(const manifests::SampleRecord& record, device::PatchView patch,
-                                   double error, const filters::Thresholds& thresholds,
-                                   const config::GuardConfig& guards) {
+device::AdaptRequest adapt_request(const std::string& id, const device::CropKeypoints& keypoints,
+                                   device::PatchView patch, double error,
+                                   const filters::Thresholds& thresholds, const config::GuardConfig& guards) {
   device::AdaptRequest request;
   request.patch = patch;
-  request.keypoints = crop_keypoints(record);
+  request.keypoints = keypoints;
   const int visible = visible_keypoints(request.keypoints);
   request.iterations = filters::scaled_iterations(filters::adaptation_iterations(error, thresholds), visible,
                                                   guards.iterations_full_at);
@@ -22,7 +21,7 @@ device::AdaptRequest adapt_request(const manifests::SampleRecord& record, device
   request.gain_window = thresholds.gain_window;
   if (guards.held_out_share == 0.0) return request;
   request.held_out =
-      filters::held_out_keypoints(request.keypoints, guards.held_out_share, guards.held_out_seed, record.id);
+      filters::held_out_keypoints(request.keypoints, guards.held_out_share, guards.held_out_seed, id);
   request.patience = guards.held_out_patience;
   if (visible < 2) request.iterations = 0;
   return request;
@@ -33,12 +32,12 @@ void refine_unit(UnitWork& work, const NetworkSource& network, const config::Jud
   std::vector<device::AdaptRequest> requests;
   std::vector<RefinedSample> samples;
   for (std::size_t i = 0; i < work.candidates.size(); ++i) {
-    const double error = initial_error(work.candidates[i], (*work.predicted)[i]);
-    if (std::isnan(error)) continue;
-    const manifests::SampleRecord& record = work.candidates[i].record;
-    const filters::Thresholds& thresholds = rules.of(record.dataset);
-    if (filters::band(error, thresholds) != filters::Band::refine) continue;
-    requests.push_back(adapt_request(record, work.decoded[i].patch, error, thresholds, rules.guards));
+    const candidates::Candidate& candidate = work.candidates[i];
+    if (candidate.role != config::Role::pseudo || std::isnan(work.errors[i])) continue;
+    const filters::Thresholds& thresholds = rules.of(candidate.record.dataset);
+    if (filters::band(work.errors[i], thresholds) != filters::Band::refine) continue;
+    requests.push_back(adapt_request(candidate.record.id, work.keypoints[i], work.decoded[i].patch,
+                                     work.errors[i], thresholds, rules.guards));
     samples.emplace_back().sample = i;
   }
   std::vector<device::AdaptOutcome> outcomes;

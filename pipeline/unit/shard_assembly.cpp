@@ -1,9 +1,9 @@
 #include "pipeline/unit/shard_assembly.h"
 
-#include <fmt/format.h>
-
 #include <map>
 #include <stdexcept>
+
+#include "pipeline/unit/judge.h"
 
 namespace q3d::pipeline::unit {
 namespace {
@@ -11,7 +11,7 @@ namespace {
 using manifests::ShardSample;
 using manifests::Verdict;
 
-// What of a kept candidate's body is a label: all that a network gives, of a truth what the file gives.
+// A predicted body is a label in full; an annotated one only where the file gives values.
 void set_label(ShardSample& sample, const device::BodyPrediction& body) {
   const bool is_truth = sample.label_kind == manifests::LabelKind::truth;
   const bool has_body = sample.label_kind != manifests::LabelKind::two_d_only;
@@ -26,33 +26,39 @@ void set_label(ShardSample& sample, const device::BodyPrediction& body) {
   sample.projected_2d = body.keypoints_2d;
 }
 
-void set_picture(ShardSample& sample, const DecodedSample& decoded) {
-  sample.image_width_px = decoded.image_width_px;
-  sample.image_height_px = decoded.image_height_px;
-  sample.crop = decoded.stored_crop;
-  sample.crop_mask = decoded.stored_mask;
-  sample.crop_side_px = decoded.stored_side_px;
-  sample.crop_from_image = decoded.stored_from_image;
+void set_picture(ShardSample& sample, const PredictedSample& predicted) {
+  sample.image_width_px = predicted.image_width_px;
+  sample.image_height_px = predicted.image_height_px;
   const loaders::pictures::SquareBox box = loaders::pictures::square_box(sample.record.box);
   sample.patch_box = {box.center_x_px, box.center_y_px, box.side_px};
 }
 
+// The bytes move; they are not copied.
+void take_crop(ShardSample& sample, EncodedCrop& crop) {
+  sample.crop = std::move(crop.picture);
+  sample.crop_mask = std::move(crop.mask);
+  sample.crop_side_px = crop.side_px;
+  sample.crop_from_image = crop.from_image;
+}
+
+// By position; null where there is none.
+std::vector<EncodedCrop*> crops_by_position(UnitWork& work) {
+  std::vector<EncodedCrop*> crops(work.candidates.size(), nullptr);
+  for (EncodedCrop& crop : work.crops) crops.at(crop.sample) = &crop;
+  return crops;
+}
+
 }  // namespace
 
-std::vector<ShardSample> shard_samples(const UnitWork& work) {
+std::vector<ShardSample> shard_samples(UnitWork& work) {
   std::map<std::size_t, const device::BodyPrediction*> refined_bodies;
   for (const RefinedSample& refined : *work.refined) refined_bodies[refined.sample] = &refined.body;
+  const std::vector<EncodedCrop*> crops = crops_by_position(work);
   std::vector<ShardSample> samples;
   for (std::size_t i = 0; i < work.candidates.size(); ++i) {
     const manifests::Judgement& judgement = work.judgements[i];
-    if (judgement.verdict != Verdict::retained && judgement.verdict != Verdict::refined) continue;
-    if (!work.decoded[i].decoded) {
-      // The picture was readable when it was predicted; a label without its picture must not be written.
-      throw std::runtime_error(fmt::format(
-          "{}: the picture {} could be read before and cannot now ({}); put it back "
-          "and build again",
-          work.candidates[i].record.id, work.candidates[i].record.image_path, work.decoded[i].detail));
-    }
+    if (!is_kept(judgement)) continue;
+    if (crops[i] == nullptr) throw std::logic_error(work.candidates[i].record.id + " is kept without a crop");
     ShardSample& sample = samples.emplace_back();
     sample.record = work.candidates[i].record;
     sample.image_sha256 = work.candidates[i].image_sha256;
@@ -60,7 +66,8 @@ std::vector<ShardSample> shard_samples(const UnitWork& work) {
     sample.label_kind = config::label_kind(work.candidates[i].role, judgement.verdict);
     const bool refined = judgement.verdict == Verdict::refined;
     set_label(sample, refined ? *refined_bodies.at(i) : (*work.predicted)[i].body);
-    set_picture(sample, work.decoded[i]);
+    set_picture(sample, (*work.predicted)[i]);
+    take_crop(sample, *crops[i]);
   }
   return samples;
 }

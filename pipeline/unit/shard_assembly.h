@@ -8,8 +8,9 @@
 
 namespace q3d::pipeline::unit {
 
-// The kept candidates of the unit in ingest order. Needs predicted, refined, judgements and, for every kept
-// candidate, its decoded picture.
-std::vector<manifests::ShardSample> shard_samples(const UnitWork& work);
+// Returns the kept candidates of the unit in ingest order. Takes the bytes of their stored crops out of
+// work.crops. Needs predicted, refined, judgements and the crop of every kept candidate; throws
+// std::logic_error where one is missing.
+std::vector<manifests::ShardSample> shard_samples(UnitWork& work);
 
 }  // namespace q3d::pipeline::unit

@@ -66,6 +66,12 @@ void run_units(const UnitFlow& flow, device::DeviceWorker& device) {
       gateway.release_wait();
     });
   });
+  tf::function_node<Item, Item> encode(graph, tf::unlimited, [&](const Item& item) {
+    failure.guard([&] {
+      if (flow.encode) flow.encode(*item);
+    });
+    return item;
+  });
   tf::sequencer_node<Item> in_order(
       graph, [](const Item& item) { return static_cast<std::size_t>(item->unit->index); });
   tf::function_node<Item, tf::continue_msg> write(graph, tf::serial, [&](const Item& item) {
@@ -77,7 +83,8 @@ void run_units(const UnitFlow& flow, device::DeviceWorker& device) {
   tf::make_edge(read, in_flight);
   tf::make_edge(in_flight, decode);
   tf::make_edge(decode, compute);
-  tf::make_edge(compute, in_order);
+  tf::make_edge(compute, encode);
+  tf::make_edge(encode, in_order);
   tf::make_edge(in_order, write);
   tf::make_edge(write, in_flight.decrementer());
   read.activate();

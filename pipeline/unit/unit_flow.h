@@ -1,7 +1,7 @@
 // The flow graph: reads like the paper's figure of Stage 2.
 //
-//   read -> decode + crop (parallel) -> predict -> judge -> refine -> judge (device thread) -> write (in
-//   order)
+//   read -> decode + crop (parallel) -> predict -> judge -> refine -> judge (device thread)
+//        -> encode (parallel) -> write (in order)
 #pragma once
 
 #include <cstdint>
@@ -22,6 +22,8 @@ struct UnitFlow {
   std::function<void(UnitWork&)> decode;
   // Called on the device thread, one unit at a time.
   std::function<void(UnitWork&)> compute;
+  // Called concurrently for several units, after compute. May be empty.
+  std::function<void(UnitWork&)> encode;
   // Called in unit order, one at a time.
   std::function<void(UnitWork&)> write;
 };

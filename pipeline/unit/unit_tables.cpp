@@ -103,6 +103,12 @@ const std::vector<std::string>& text_column(const Table& table, const std::strin
   return found->second;
 }
 
+std::vector<std::vector<std::byte>>& blob_column(Table& table, const std::string& name) {
+  const auto found = table.blobs.find(name);
+  if (found == table.blobs.end()) throw std::runtime_error("blob column " + name + " is missing");
+  return found->second;
+}
+
 // Texts of the table are padded with NUL, so none may hold one; a hostile annotation file's may.
 std::string storable(std::string text) {
   std::replace(text.begin(), text.end(), '\0', '?');
@@ -248,6 +254,48 @@ std::vector<MeasuredLabel> measured_from_table(const Table& table) {
     for (std::size_t i = 0; i < labels.size(); ++i) labels[i].measures.*field = values[i];
   }
   return labels;
+}
+
+Table to_table(const std::vector<EncodedCrop>& crops) {
+  Table table;
+  table.rows = static_cast<std::int64_t>(crops.size());
+  std::vector<std::int64_t> positions;
+  std::vector<std::int32_t> sides;
+  std::vector<double> affines;
+  auto& pictures = table.blob_views["picture"];
+  auto& masks = table.blob_views["mask"];
+  for (const EncodedCrop& crop : crops) {
+    positions.push_back(static_cast<std::int64_t>(crop.sample));
+    sides.push_back(crop.side_px);
+    affines.insert(affines.end(), crop.from_image.begin(), crop.from_image.end());
+    pictures.emplace_back(crop.picture);
+    masks.emplace_back(crop.mask);
+  }
+  table.add<std::int64_t>("sample", {}, positions);
+  table.add<std::int32_t>("side_px", {}, sides);
+  table.add<double>("from_image", {2, 3}, affines);
+  return table;
+}
+
+std::vector<EncodedCrop> crops_from_table(Table table) {
+  std::vector<EncodedCrop> crops(static_cast<std::size_t>(table.rows));
+  const auto positions = table.column<std::int64_t>("sample");
+  const auto sides = table.column<std::int32_t>("side_px");
+  const auto affines = table.column<double>("from_image");
+  auto& pictures = blob_column(table, "picture");
+  auto& masks = blob_column(table, "mask");
+  for (std::size_t i = 0; i < crops.size(); ++i) {
+    if (positions[i] < 0 || (i > 0 && positions[i] <= positions[i - 1])) {
+      throw std::runtime_error(
+          fmt::format("column sample, row {}: got {}, expected ascending positions", i, positions[i]));
+    }
+    crops[i].sample = static_cast<std::size_t>(positions[i]);
+    crops[i].picture = std::move(pictures[i]);
+    crops[i].mask = std::move(masks[i]);
+    crops[i].side_px = sides[i];
+    std::copy_n(affines.begin() + static_cast<std::ptrdiff_t>(6 * i), 6, crops[i].from_image.begin());
+  }
+  return crops;
 }
 
 }  // namespace q3d::pipeline::unit

@@ -1,4 +1,4 @@
-// What predict, refine and measure put on disk for one unit, as tables.
+// What predict, refine, measure and crops put on disk for one unit, as tables.
 #pragma once
 
 #include <span>
@@ -14,6 +14,8 @@ manifests::Table to_table(std::span<const candidates::Candidate> candidates,
                           const std::vector<PredictedSample>& samples);
 manifests::Table to_table(const std::vector<RefinedSample>& samples);
 manifests::Table to_table(const std::vector<MeasuredLabel>& labels);
+// The table refers to the bytes of the crops, which must outlive it.
+manifests::Table to_table(const std::vector<EncodedCrop>& crops);
 
 // Throw std::runtime_error when a column is missing or has another type.
 std::vector<PredictedSample> predicted_from_table(const manifests::Table& table);
@@ -21,5 +23,7 @@ std::vector<PredictedSample> predicted_from_table(const manifests::Table& table)
 manifests::SampleRecord candidate_from_table(const manifests::Table& table, std::size_t row);
 std::vector<RefinedSample> refined_from_table(const manifests::Table& table);
 std::vector<MeasuredLabel> measured_from_table(const manifests::Table& table);
+// Moves the bytes out of the table. Throws also when the positions do not ascend.
+std::vector<EncodedCrop> crops_from_table(manifests::Table table);
 
 }  // namespace q3d::pipeline::unit

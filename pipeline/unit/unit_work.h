@@ -1,11 +1,15 @@
 // The one item that travels through the flow graph: a unit and what the stages have made of it so far.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
+#include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "filters/guards.h"
-#include "loaders/pictures/crop.h"
+#include "loaders/pictures/stored_crop.h"
 #include "manifests/verdict.h"
 #include "pipeline/candidates/ingest.h"
 #include "pipeline/device/network.h"
@@ -37,9 +41,17 @@ struct MeasuredLabel {
   filters::LabelMeasures measures;
 };
 
-// A decoded picture, as far as later stages need it.
+// The stored crop of a candidate, as its shard holds it.
+struct EncodedCrop {
+  std::size_t sample = 0;              // position within the unit
+  std::vector<std::byte> picture;      // JPEG or PNG; empty where shards only refer to pictures
+  std::vector<std::byte> mask;         // PNG; empty where there is none
+  int side_px = 0;                     // of the square crop
+  std::array<double, 6> from_image{};  // 2x3 affine, image px -> crop px
+};
+
+// The parts of a decoded picture that later steps need.
 struct DecodedSample {
-  bool decoded = false;
   manifests::Reason failure = manifests::Reason::none;
   std::string detail;
   int image_width_px = 0;
@@ -48,15 +60,13 @@ struct DecodedSample {
   std::vector<std::uint8_t> patch;       // 256 x 256 x 3 RGB: the network's crop
   double mask_area_px = 0.0;             // of the patch, when asked for; 0 = no silhouette in it
   std::vector<std::uint8_t> patch_mask;  // 256 x 256, the patch's silhouette, when asked for; empty without
-  std::vector<std::byte> stored_crop;    // encoded; empty when not asked for
-  std::vector<std::byte> stored_mask;
-  int stored_side_px = 0;
-  std::array<double, 6> stored_from_image{};
+  std::optional<loaders::pictures::StoredCrop> stored_crop;  // pixels, when asked for; freed once encoded
 };
 
 struct UnitWork {
   const candidates::Unit* unit = nullptr;
-  std::span<const candidates::Candidate> candidates;  // the unit's own
+  std::span<const candidates::Candidate> candidates;  // the unit's own; set_candidates
+  std::vector<device::CropKeypoints> keypoints;       // by position: the annotated ones, in the crop
 
   // Filled from the journal where an earlier run had finished the stage, else by the stage's node.
   std::optional<std::vector<PredictedSample>> predicted;
@@ -67,8 +77,28 @@ struct UnitWork {
   bool measured_before = false;
   bool shard_before = false;
 
-  std::vector<DecodedSample> decoded;            // by position; freed once the shard is written
+  // L_proj of the bodies in `predicted` by position, in crop units. It is NaN where the candidate failed,
+  // where no keypoint is visible, and where the body has no projection.
+  std::vector<double> errors;
+  std::vector<DecodedSample> decoded;            // by position; freed once the stored crops are encoded
   std::vector<manifests::Judgement> judgements;  // by position
+
+  // Of the candidates that this build or an earlier one kept, in the order of `sample`.
+  std::vector<EncodedCrop> crops;
+  std::size_t crops_encoded = 0;  // how many of them were encoded in this run
 };
+
+// Sets work.candidates and computes work.keypoints. `candidates` must outlive the work. The keypoints of a
+// failed record are zeros.
+void set_candidates(UnitWork& work, std::span<const candidates::Candidate> candidates);
+
+// Returns a new item for one unit of the pool, with its candidates set. `ingest` must outlive it.
+std::shared_ptr<UnitWork> open_unit(const candidates::Ingest& ingest, std::int64_t index);
+
+// Sets work.predicted and computes work.errors. Needs the candidates.
+void set_predictions(UnitWork& work, std::vector<PredictedSample> samples);
+
+// Returns the stored crop of the candidate at this position, or null where none has been encoded.
+const EncodedCrop* find_crop(const UnitWork& work, std::size_t sample);
 
 }  // namespace q3d::pipeline::unit

@@ -65,6 +65,24 @@ TEST(Table, ReadsBackWhatWasWritten) {
   expect_equal(read_table(path), make_table());
 }
 
+TEST(Table, BytesThatLieElsewhereMakeTheSameFile) {
+  const testing::ScratchDir scratch;
+  const Table owning = make_table();
+  Table viewing = make_table();
+  for (const auto& [name, values] : owning.blobs) {
+    viewing.blobs.erase(name);
+    viewing.blob_views[name] = {values.begin(), values.end()};
+  }
+  EXPECT_EQ(write_table(scratch.path() / "owning.h5", owning),
+            write_table(scratch.path() / "viewing.h5", viewing));
+  expect_equal(read_table(scratch.path() / "viewing.h5"), owning);
+  viewing.blobs["picture"] = owning.blobs.at("picture");
+  EXPECT_THROW(write_table(scratch.path() / "twice.h5", viewing), std::logic_error);
+  viewing.blobs.erase("picture");
+  viewing.blob_views["picture"].pop_back();
+  EXPECT_THROW(write_table(scratch.path() / "short.h5", viewing), std::logic_error);
+}
+
 TEST(Table, HoldsNoRowsOrNoColumns) {
   const testing::ScratchDir scratch;
   Table no_rows;

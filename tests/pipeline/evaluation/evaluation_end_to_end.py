@@ -9,7 +9,7 @@ import shutil
 import numpy as np
 from PIL import Image
 
-from e2e import (Case, latest, make_network, prima_dataset, read_csv, read_samples, render_world, run, run_json,
+from e2e import (Case, copy_folder, digests, latest, make_network, prima_dataset, read_csv, read_samples, render_world, run, run_json,
                  world_animal3d, world_body, world_superanimal, write_json)
 
 SIDE = 256
@@ -219,6 +219,47 @@ class Evaluation(Case):
         self.assertAlmostEqual(means["discarded", "prediction"]["against_annotated"]["pa_mpjpe_mm"],
                                np.mean(discarded), places=6)
         self.assertEqual(means["pool", "prediction"]["samples"], len(rows))
+
+    def test_labels_are_read_from_the_build_alone(self):
+        source = copy_folder(self.world / "superanimal_quadruped", self.folder / "source")
+        errors = sorted(number(row["l_proj"]) for row in self.predictions().values()
+                        if row["dataset"] == "superanimal/test" and row["l_proj"])
+        config = self.write_config("alone.json", name="alone", datasets=[{**self.superanimal, "root": str(source)}],
+                                   filter={"tau_low": errors[len(errors) // 2], "tau_high": errors[-2], "delta": 0.0})
+        out, report = self.folder / "alone", self.folder / "report"
+        arguments = ["evaluate-labels", "--config", config, "--out", out, "--truth", self.truth_file, "--masks",
+                     self.world, "--report", report]
+        run("build", "--config", config, "--out", out, "--quiet")
+        run(*arguments)
+        before = digests(report)
+        # A build with a veto list is another dataset, although it has the same predictions and is the newest.
+        veto = self.folder / "veto.txt"
+        veto.write_text(next(row["id"] for row in read_csv(report / "labels.csv") if row["label_l_proj"]) + "\n")
+        run("build", "--config", config, "--out", out, "--veto", veto, "--quiet")
+        run(*arguments)
+        self.assertEqual(digests(report), before)
+        # Truth and masks are given, so neither the annotation file nor a picture is read.
+        shutil.rmtree(source)
+        run(*arguments)
+        self.assertEqual(digests(report), before)
+        # Without them the annotation file is needed, and it is gone.
+        self.assertNotEqual(run(*arguments[:5], expect=None).returncode, 0)
+
+    def test_predictions_that_were_made_anew_are_refused(self):
+        source = copy_folder(self.world / "superanimal_quadruped", self.folder / "source")
+        config = self.write_config("anew.json", name="anew", datasets=[{**self.superanimal, "root": str(source)}],
+                                   filter={"tau_low": 0.1, "tau_high": 0.2})
+        out = self.folder / "anew"
+        run("build", "--config", config, "--out", out, "--quiet")
+        older = latest(out)
+        names = sorted({row["id"].split("/")[-1].split("#")[0] for row in read_csv(older / "verdicts.csv")})
+        chosen, other = (next(source.rglob(name)) for name in names[:2])
+        chosen.write_bytes(other.read_bytes())  # other pixels under an old name
+        run("build", "--config", config, "--out", out, "--quiet")
+        self.assertNotEqual(latest(out), older)
+        shutil.rmtree(latest(out))
+        result = run("evaluate-labels", "--config", config, "--out", out, "--truth", self.truth_file, expect=1)
+        self.assertIn("made anew for other candidates or pictures", result.stderr)
 
     def test_labels_need_a_finished_build(self):
         config = self.write_config("unbuilt.json", name="unbuilt", datasets=[self.superanimal],

@@ -104,6 +104,29 @@ TEST(StageKeys, WhatDecidesRefinementsAndShardsIsInTheirKeys) {
   EXPECT_NE(before.shards, quality.keys().shards);
 }
 
+TEST(StageKeys, WhatDecidesTheBytesOfStoredCropsAndNothingElseIsInTheirKey) {
+  const std::string before = Inputs().keys().crops;
+  const auto changed = [&](auto&& change) {
+    Inputs other;
+    change(other);
+    return other.keys().crops != before;
+  };
+  EXPECT_TRUE(changed([](Inputs& i) { i.config.shards.jpeg_quality = 50; }));
+  EXPECT_TRUE(changed([](Inputs& i) { i.config.shards.images = "png"; }));
+  EXPECT_TRUE(changed([](Inputs& i) { i.config.shards.crop_scale = 2.5; }));
+  EXPECT_TRUE(changed([](Inputs& i) { i.config.shards.crop_min_side_px = 300; }));
+  EXPECT_TRUE(changed([](Inputs& i) { i.config.shards.unit_size = 3; }));
+  EXPECT_FALSE(changed([](Inputs& i) { i.limits().tau_high = 0.3; }));
+  EXPECT_FALSE(changed([](Inputs& i) { i.assets.checkpoint = "x"; }));
+  EXPECT_FALSE(changed([](Inputs& i) { i.config.datasets[0].role = config::Role::truth; }));
+  EXPECT_FALSE(changed([](Inputs& i) { i.config.name = "another"; }));
+  Inputs png;
+  png.config.shards.images = "png";
+  Inputs quality = png;
+  quality.config.shards.jpeg_quality = 50;
+  EXPECT_EQ(png.keys().crops, quality.keys().crops) << "a PNG has no quality";
+}
+
 TEST(StageKeys, WithoutPseudoLabelsNothingOfTheNetworkIsInThem) {
   Inputs inputs;
   inputs.config.datasets[0].role = config::Role::truth;

@@ -24,13 +24,13 @@ struct GivenUnit {
   std::vector<candidates::Candidate> candidates;
   config::JudgingRules rules;
   UnitWork work;
+  std::vector<PredictedSample> predicted;
 
   GivenUnit() {
     filters::Thresholds& limits = rules.thresholds["d"];
     limits.tau_low = 0.1875;
     limits.tau_high = 0.4375;
     limits.delta = 0.1;
-    work.predicted.emplace();
     work.refined.emplace();
   }
   void add(int visible, float error) {
@@ -41,18 +41,20 @@ struct GivenUnit {
     for (int k = 0; k < visible; ++k) {
       candidate.record.keypoints[static_cast<std::size_t>(k)] = {128.0, 128.0, 1.0F, 1.0F};
     }
-    work.predicted->emplace_back().body.keypoints_2d.fill(error);
+    predicted.emplace_back().body.keypoints_2d.fill(error);
   }
   void refine(std::size_t sample, std::vector<double> curve, std::vector<double> held_out = {}) {
     work.refined->push_back({sample, std::move(curve), {}, std::move(held_out)});
   }
   Judgement judge(std::size_t sample = 0) {
-    work.candidates = candidates;
+    set_candidates(work, candidates);
+    set_predictions(work, predicted);
     judge_unit(work, rules);
     return work.judgements[sample];
   }
   device::AdaptRequest request() const {
-    return adapt_request(candidates[0].record, {}, kError, rules.of("d"), rules.guards);
+    const manifests::SampleRecord& record = candidates[0].record;
+    return adapt_request(record.id, crop_keypoints(record), {}, kError, rules.of("d"), rules.guards);
   }
 };
 

@@ -23,7 +23,7 @@ std::string parts(const PictureFacts& facts) {
 TEST(PictureNeeds, FollowTheTable) {
   struct Case {
     Standing standing;
-    bool is_pseudo, goes_to_shard, measures_mask;
+    bool is_pseudo, lacks_crop, measures_mask;
     const char* expected;
   };
   const auto unpredicted = Standing::unpredicted;
@@ -43,7 +43,7 @@ TEST(PictureNeeds, FollowTheTable) {
       {finished, true, false, false, ""},      {finished, true, true, true, ""},
   };
   for (const Case& each : cases) {
-    EXPECT_EQ(parts({each.standing, each.is_pseudo, each.goes_to_shard, each.measures_mask}), each.expected)
+    EXPECT_EQ(parts({each.standing, each.is_pseudo, each.lacks_crop, each.measures_mask}), each.expected)
         << "case " << (&each - cases.data());
   }
 }
@@ -64,8 +64,13 @@ struct OneCandidate {
     record.box = {0, 0, 256, 256};
     record.mask_path = "/mask.png";
     record.keypoints.fill({128.0, 128.0, 1.0F, 1.0F});
-    work.candidates = candidates;
-    work.predicted.emplace(1)[0].body.keypoints_2d.fill(error);
+    predict(error);
+  }
+  void predict(float error) {
+    set_candidates(work, candidates);
+    std::vector<PredictedSample> samples(1);
+    samples[0].body.keypoints_2d.fill(error);
+    set_predictions(work, std::move(samples));
   }
   PictureFacts facts() const { return picture_facts(work, 0, &rules); }
 };
@@ -88,6 +93,7 @@ TEST(PictureNeeds, AFailedPredictionIsFinished) {
 TEST(PictureNeeds, WithoutVisibleKeypointsAPseudoLabelIsFinished) {
   OneCandidate one;
   one.candidates[0].record.keypoints.fill({128.0, 128.0, 0.0F, 0.0F});
+  one.predict(0.0F);
   EXPECT_EQ(one.facts().standing, Standing::finished);
 }
 
@@ -119,14 +125,19 @@ TEST(PictureNeeds, ALabelThatIsNotPredictedNeedsNoPatch) {
   EXPECT_EQ(parts(one.facts()), "c");
 }
 
-TEST(PictureNeeds, AStoredCropIsForAShardThatIsStillToBeMade) {
+TEST(PictureNeeds, AStoredCropIsEncodedOnceAndForAShardThatIsStillToBeMade) {
   OneCandidate one;
-  EXPECT_TRUE(one.facts().goes_to_shard);
+  EXPECT_TRUE(one.facts().lacks_crop);
   one.work.shard_before = true;
-  EXPECT_FALSE(one.facts().goes_to_shard);
+  EXPECT_FALSE(one.facts().lacks_crop);
   one.work.shard_before = false;
   one.candidates[0].exclusion.reason = Reason::vetoed;
-  EXPECT_FALSE(one.facts().goes_to_shard);
+  EXPECT_FALSE(one.facts().lacks_crop);
+  one.candidates[0].exclusion.reason = Reason::none;
+  one.work.crops.emplace_back().sample = 1;
+  EXPECT_TRUE(one.facts().lacks_crop) << "the crop is another candidate's";
+  one.work.crops.front().sample = 0;
+  EXPECT_FALSE(one.facts().lacks_crop);
 }
 
 TEST(PictureNeeds, AMaskIsForPseudoLabelsThatAreMeasuredAgainstIt) {

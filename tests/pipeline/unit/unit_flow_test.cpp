@@ -29,6 +29,7 @@ class Recorder {
       std::this_thread::sleep_for(std::chrono::milliseconds(work.unit->index % 3 == 0 ? 8 : 1));
     };
     flow.compute = [this](UnitWork&) { computing_threads.push_back(std::this_thread::get_id()); };
+    flow.encode = [this](UnitWork&) { ++encoded; };
     flow.write = [this](UnitWork& work) {
       written.push_back(work.unit->index);
       --in_flight;
@@ -38,6 +39,7 @@ class Recorder {
   UnitFlow flow;
   std::atomic<int> in_flight = 0;
   std::atomic<int> most_in_flight = 0;
+  std::atomic<int> encoded = 0;
   std::vector<std::thread::id> computing_threads;  // touched by the device thread only
   std::vector<std::int64_t> written;               // touched by the serial writer only
 
@@ -55,6 +57,7 @@ TEST_P(UnitFlowThreads, WritesInOrderComputesOnOneThreadAndBoundsWhatIsOpen) {
   device::DeviceWorker device;
   run_units(recorder.flow, device);
   ASSERT_EQ(recorder.written.size(), 20U);
+  EXPECT_EQ(recorder.encoded, 20);
   for (std::int64_t i = 0; i < 20; ++i) EXPECT_EQ(recorder.written[static_cast<std::size_t>(i)], i);
   for (const auto& id : recorder.computing_threads) EXPECT_EQ(id, recorder.computing_threads.front());
   // The source may hold one item ready beyond the limit.
@@ -67,11 +70,12 @@ TEST(UnitFlow, AnExceptionOfAnyStepStopsTheRunAndIsRethrown) {
   const std::function<void(UnitWork&)> fails = [](UnitWork& work) {
     if (work.unit->index == 5) throw std::runtime_error("unit 5 broke");
   };
-  for (int step = 0; step < 3; ++step) {
+  for (int step = 0; step < 4; ++step) {
     Recorder recorder(50);
     if (step == 0) recorder.flow.decode = fails;
     if (step == 1) recorder.flow.compute = fails;
-    if (step == 2) recorder.flow.write = fails;
+    if (step == 2) recorder.flow.encode = fails;
+    if (step == 3) recorder.flow.write = fails;
     device::DeviceWorker device;
     try {
       run_units(recorder.flow, device);
@@ -81,6 +85,14 @@ TEST(UnitFlow, AnExceptionOfAnyStepStopsTheRunAndIsRethrown) {
     }
     EXPECT_LT(recorder.written.size(), 50U);
   }
+}
+
+TEST(UnitFlow, ARunWithoutEncodingWritesAllTheSame) {
+  Recorder recorder(4);
+  recorder.flow.encode = nullptr;
+  device::DeviceWorker device;
+  run_units(recorder.flow, device);
+  EXPECT_EQ(recorder.written.size(), 4U);
 }
 
 TEST(UnitFlow, NoUnitsIsNoWork) {

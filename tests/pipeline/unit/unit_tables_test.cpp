@@ -132,5 +132,26 @@ TEST(UnitTables, AMissingColumnIsNamed) {
   }
 }
 
+TEST(UnitTables, CropsSurviveTheDisk) {
+  const testing::ScratchDir scratch;
+  std::vector<EncodedCrop> crops(3);
+  crops[0] = {2, {std::byte{1}, std::byte{2}}, {std::byte{3}}, 480, {1, 2, 3, 4, 5, 6}};
+  crops[1] = {5, {std::byte{7}}, {}, 300, {6, 5, 4, 3, 2, 1}};
+  crops[2] = {6, {}, {}, 256, {}};  // of shards that refer to pictures
+  manifests::write_table(scratch.path() / "t.h5", to_table(crops));
+  const auto back = crops_from_table(manifests::read_table(scratch.path() / "t.h5"));
+  ASSERT_EQ(back.size(), crops.size());
+  for (std::size_t i = 0; i < crops.size(); ++i) {
+    EXPECT_EQ(back[i].sample, crops[i].sample);
+    EXPECT_EQ(back[i].picture, crops[i].picture);
+    EXPECT_EQ(back[i].mask, crops[i].mask);
+    EXPECT_EQ(back[i].side_px, crops[i].side_px);
+    EXPECT_EQ(back[i].from_image, crops[i].from_image);
+  }
+  std::swap(crops[0].sample, crops[1].sample);
+  manifests::write_table(scratch.path() / "t.h5", to_table(crops));
+  EXPECT_THROW(crops_from_table(manifests::read_table(scratch.path() / "t.h5")), std::runtime_error);
+}
+
 }  // namespace
 }  // namespace q3d::pipeline::unit

@@ -1,0 +1,89 @@
+#include "pipeline/evaluation/built_version.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <stdexcept>
+#include <vector>
+
+#include "manifests/atomic_file.h"
+#include "manifests/digest.h"
+
+namespace q3d::pipeline::evaluation {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+std::set<std::string> dataset_names(const config::BuildConfig& config) {
+  std::set<std::string> names;
+  for (const config::DatasetConfig& dataset : config.datasets)
+    names.insert(dataset.name + "/" + dataset.split);
+  return names;
+}
+
+std::set<std::string> dataset_names(const json& annotations) {
+  std::set<std::string> names;
+  for (const auto& [name, digest] : annotations.items()) names.insert(name);
+  return names;
+}
+
+// Whether dataset.json tells of a build with this config. `veto` is the digest of the config's veto list, or
+// null.
+bool is_of(const json& document, const config::BuildConfig& config, const stages::StageKeys& keys,
+           const json& veto) {
+  const json& provenance = document.at("provenance");
+  const json& built_veto = provenance.at("veto");
+  return document.at("name") == config.name && document.at("version") == config.version &&
+         provenance.at("stage_keys").at("shards") == keys.shards &&
+         dataset_names(provenance.at("annotations")) == dataset_names(config) &&
+         (built_veto.is_null() ? built_veto : built_veto.at("sha256")) == veto &&
+         provenance.at("leakage").is_null() == !config.leakage.has_value();
+}
+
+std::vector<BuiltVersion> built_versions(const config::BuildConfig& config, const stages::StageKeys& keys,
+                                         const fs::path& out) {
+  const json veto = config.veto.empty() ? json() : json(manifests::sha256_file(config.veto));
+  std::vector<BuiltVersion> versions;
+  for (const fs::directory_entry& entry : fs::directory_iterator(out)) {
+    const fs::path file = entry.path() / "dataset.json";
+    if (entry.is_symlink() || !fs::exists(file)) continue;
+    try {
+      const json document = json::parse(manifests::read_file(file));
+      if (!is_of(document, config, keys, veto)) continue;
+      versions.push_back({entry.path(), document.at("content_id").get<std::string>()});
+    } catch (const json::exception& error) {
+      throw std::runtime_error(
+          fmt::format("{}: not a readable dataset.json: {}", file.string(), error.what()));
+    }
+  }
+  return versions;
+}
+
+}  // namespace
+
+BuiltVersion find_built_version(const config::BuildConfig& config, const stages::StageKeys& keys,
+                                const fs::path& out) {
+  const std::vector<BuiltVersion> versions = built_versions(config, keys, out);
+  if (versions.empty()) {
+    throw std::runtime_error(
+        fmt::format("{}: there is no finished dataset of this config; run `build` with the same config and "
+                    "output folder first",
+                    out.string()));
+  }
+  if (versions.size() == 1) return versions.front();
+  std::error_code error;
+  const fs::path latest = fs::canonical(out / "latest", error);
+  const auto newest = std::find_if(versions.begin(), versions.end(), [&](const BuiltVersion& version) {
+    return !error && fs::canonical(version.folder) == latest;
+  });
+  if (newest != versions.end()) return *newest;
+  throw std::runtime_error(fmt::format(
+      "{}: {} finished datasets were built with this config from other pictures, and `latest` points "
+      "to none of them; run `build` with the same config, which points `latest` to its dataset",
+      out.string(), versions.size()));
+}
+
+}  // namespace q3d::pipeline::evaluation

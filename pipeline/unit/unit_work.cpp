@@ -1,0 +1,47 @@
+#include "pipeline/unit/unit_work.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "filters/metrics.h"
+#include "pipeline/unit/annotated_body.h"
+#include "pipeline/unit/crop_keypoints.h"
+
+namespace q3d::pipeline::unit {
+
+void set_candidates(UnitWork& work, std::span<const candidates::Candidate> candidates) {
+  work.candidates = candidates;
+  work.keypoints.assign(candidates.size(), {});
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    const manifests::SampleRecord& record = candidates[i].record;
+    if (record.failure == manifests::Reason::none) work.keypoints[i] = crop_keypoints(record);
+  }
+}
+
+std::shared_ptr<UnitWork> open_unit(const candidates::Ingest& ingest, std::int64_t index) {
+  auto work = std::make_shared<UnitWork>();
+  work->unit = &ingest.units[static_cast<std::size_t>(index)];
+  set_candidates(*work, std::span(ingest.candidates).subspan(work->unit->first, work->unit->count));
+  return work;
+}
+
+void set_predictions(UnitWork& work, std::vector<PredictedSample> samples) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  work.errors.assign(samples.size(), kNone);
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    if (samples[i].failure != manifests::Reason::none) continue;
+    if (!has_projection(samples[i].body.keypoints_2d)) continue;
+    work.errors[i] =
+        filters::projection_error(samples[i].body.keypoints_2d, work.keypoints[i]).value_or(kNone);
+  }
+  work.predicted = std::move(samples);
+}
+
+const EncodedCrop* find_crop(const UnitWork& work, std::size_t sample) {
+  const auto found =
+      std::lower_bound(work.crops.begin(), work.crops.end(), sample,
+                       [](const EncodedCrop& crop, std::size_t value) { return crop.sample < value; });
+  return found == work.crops.end() || found->sample != sample ? nullptr : &*found;
+}
+
+}  // namespace q3d::pipeline::unit
