@@ -31,15 +31,16 @@ class UnitBuilder {
         rules_(rules),
         keys_(keys),
         workspace_(workspace),
-        predictions_(workspace.out(), "predict", keys.predict),
-        refinements_(workspace.out(), "refine", keys.refine),
-        shards_(workspace.out(), "shards", keys.shards, &candidates::Unit::label_digest),
+        predictions_(workspace.out(), "predict", keys.predict, workspace.warn()),
+        refinements_(workspace.out(), "refine", keys.refine, workspace.warn()),
+        shards_(workspace.out(), "shards", keys.shards, workspace.warn(), &candidates::Unit::label_digest),
         judgements_(workspace.ingest().candidates.size()),
         progress_("candidates", static_cast<std::int64_t>(workspace.ingest().candidates.size()),
                   workspace.quiet()) {
     // By the labels' digest: what a veto leaves out is not measured.
     if (!keys.measure.empty()) {
-      measurements_.emplace(workspace.out(), "measure", keys.measure, &candidates::Unit::label_digest);
+      measurements_.emplace(workspace.out(), "measure", keys.measure, workspace.warn(),
+                            &candidates::Unit::label_digest);
     }
   }
 
@@ -52,14 +53,18 @@ class UnitBuilder {
     unit::UnitFlow flow;
     flow.units = static_cast<std::int64_t>(workspace_.ingest().units.size());
     flow.read = [this](std::int64_t index) { return read(index); };
-    flow.decode = [this](unit::UnitWork& work) { unit::decode_unit(work, config_.shards, &rules_); };
+    flow.decode = [this](unit::UnitWork& work) {
+      // Here, because several units are decoded at once: it reads the whole shard.
+      work.shard_before = shards_.has(*work.unit);
+      unit::decode_unit(work, config_.shards, &rules_);
+    };
     flow.compute = [this](unit::UnitWork& work) { compute(work); };
     flow.write = [this](unit::UnitWork& work) { write(work); };
     unit::run_units(flow, workspace_.device());
   }
 
   const std::vector<manifests::Judgement>& judgements() const { return judgements_; }
-  const stages::StageStore& shards() const { return shards_; }
+  stages::StageStore& shards() { return shards_; }
 
  private:
   std::shared_ptr<unit::UnitWork> read(std::int64_t index) {
@@ -77,7 +82,6 @@ class UnitBuilder {
     work->predicted_before = work->predicted.has_value();
     work->refined_before = work->refined.has_value();
     work->measured_before = work->measured.has_value();
-    work->shard_before = shards_.has(*work->unit);
     if (work->predicted) unit::judge_unit(*work, rules_);
     return work;
   }
@@ -144,7 +148,8 @@ BuildSummary build(const config::BuildConfig& config, const run::RunOptions& opt
 
   BuildSummary summary;
   summary.folder = version_folder(options.out, config, keys);
-  summary.was_up_to_date = is_published(summary.folder, keys);
+  summary.was_up_to_date = is_published(summary.folder, keys, workspace.digests(), workspace.warn());
+  workspace.digests().save();
   if (!summary.was_up_to_date) {
     UnitBuilder units(config, rules, keys, workspace);
     units.run();

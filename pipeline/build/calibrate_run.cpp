@@ -45,7 +45,8 @@ struct Scored {
 std::vector<Scored> predict_pool(const config::BuildConfig& config, Workspace& workspace) {
   const candidates::Ingest& ingest = workspace.ingest();
   stages::StageStore predictions(workspace.out(), "predict",
-                                 stages::predict_key(config, workspace.assets(), workspace.device_key()));
+                                 stages::predict_key(config, workspace.assets(), workspace.device_key()),
+                                 workspace.warn());
   std::vector<Scored> scored;
   run::Progress progress("predicted", static_cast<std::int64_t>(ingest.candidates.size()), workspace.quiet());
   unit::UnitFlow flow;

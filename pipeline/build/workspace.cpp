@@ -38,6 +38,7 @@ Workspace::Workspace(const config::BuildConfig& config, const run::RunOptions& o
       assets_(stages::digest_assets(config, digests_)),
       device_key_(config::needs_network(config) ? network::device_key(config.network) : std::string()),
       ingest_(candidates::ingest(config, digests_, network::load_body_meshes)) {
+  if (!options_.warn) options_.warn = [](const std::string&) {};
   leakage::leave_out(config, digests_, options.out, options.quiet, ingest_);
   if (options_.quiet) return;
   fmt::print(stderr, "{} candidates in {} units\n", ingest_.candidates.size(), ingest_.units.size());

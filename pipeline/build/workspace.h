@@ -29,6 +29,8 @@ class Workspace {
   // Empty, like the digests of assets(), when no dataset needs the network.
   const std::string& device_key() const { return device_key_; }
   bool quiet() const { return options_.quiet; }
+  const run::Warn& warn() const { return options_.warn; }  // never empty
+  manifests::DigestCache& digests() { return digests_; }
 
   // The thread on which the network lives.
   device::DeviceWorker& device() { return device_; }

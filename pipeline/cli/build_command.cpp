@@ -77,6 +77,7 @@ config::BuildConfig configured(const Arguments& arguments) {
 
 Command add_build(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
+  arguments->run.warn = print_warning;
   CLI::App* command = declare(app, "build");
   command
       ->add_option("-c,--config", arguments->configs,

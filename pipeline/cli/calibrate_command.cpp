@@ -87,6 +87,7 @@ nlohmann::ordered_json to_json(const build::CalibrationSummary& summary) {
 
 Command add_calibrate(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
+  arguments->run.warn = print_warning;
   CLI::App* command = declare(app, "calibrate");
   command
       ->add_option("-c,--config", arguments->configs,

@@ -7,6 +7,7 @@
 
 #include <array>
 #include <functional>
+#include <string>
 #include <string_view>
 
 namespace q3d::pipeline::cli {
@@ -41,6 +42,9 @@ CLI::App* declare(CLI::App& app, std::string_view name);
 // A command that was chosen: runs it and returns the exit code. Throws ConfigError, Interrupted,
 // std::exception.
 using Command = std::function<int()>;
+
+// Prints "warning: <line>" on stderr, whatever --quiet says. Given to runs as RunOptions::warn.
+void print_warning(const std::string& line);
 
 Command add_build(CLI::App& app);
 Command add_calibrate(CLI::App& app);

@@ -34,6 +34,7 @@ int run(const Arguments& arguments) {
 Command add_evaluate_labels(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   evaluation::LabelOptions& options = arguments->options;
+  options.run.warn = print_warning;
   CLI::App* command = declare(app, "evaluate-labels");
   command->add_option("-c,--config", arguments->configs, "the build's config, thresholds included")
       ->required()

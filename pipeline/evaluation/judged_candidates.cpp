@@ -43,7 +43,8 @@ std::vector<PublishedVerdict> read_verdicts(const fs::path& file) {
 }
 
 // Opening a store would make its folder.
-stages::StageStore open_store(const fs::path& out, const std::string& stage, const std::string& key) {
+stages::StageStore open_store(const fs::path& out, const std::string& stage, const std::string& key,
+                              const run::Warn& warn) {
   const fs::path folder = stages::stage_folder(out, stage, key);
   if (!fs::exists(folder)) {
     throw std::runtime_error(
@@ -51,10 +52,10 @@ stages::StageStore open_store(const fs::path& out, const std::string& stage, con
                     "it again",
                     folder.string()));
   }
-  return {out, stage, key};
+  return {out, stage, key, warn};
 }
 
-manifests::Table load(const stages::StageStore& store, const candidates::Unit& unit) {
+manifests::Table load(stages::StageStore& store, const candidates::Unit& unit) {
   if (auto table = store.load(unit)) return std::move(*table);
   throw std::runtime_error(fmt::format("{}: not finished; `build` with the same config makes it again",
                                        store.file(unit).string()));
@@ -100,9 +101,9 @@ JudgedPool read_judged_pool(const config::BuildConfig& config, build::Workspace&
   const stages::StageKeys keys = stages::stage_keys(config, config::judging_rules(config), ingest,
                                                     workspace.assets(), workspace.device_key());
   const fs::path folder = build::version_folder(workspace.out(), config, keys);
-  if (!build::is_published(folder, keys)) {
+  if (!build::is_published(folder, keys, workspace.digests(), workspace.warn())) {
     throw std::runtime_error(
-        fmt::format("{}: there is no finished dataset of this config; run `build` with "
+        fmt::format("{}: there is no finished, sound dataset of this config; run `build` with "
                     "the same config and output folder first",
                     folder.string()));
   }
@@ -115,8 +116,8 @@ JudgedPool read_judged_pool(const config::BuildConfig& config, build::Workspace&
   if (!fits) {
     throw std::runtime_error((folder / "verdicts.csv").string() + ": lists other candidates than the config");
   }
-  const stages::StageStore predictions = open_store(workspace.out(), "predict", keys.predict);
-  const stages::StageStore refinements = open_store(workspace.out(), "refine", keys.refine);
+  stages::StageStore predictions = open_store(workspace.out(), "predict", keys.predict, workspace.warn());
+  stages::StageStore refinements = open_store(workspace.out(), "refine", keys.refine, workspace.warn());
   JudgedPool pool;
   pool.dataset = folder.filename().string();
   pool.content_id = dataset::read_dataset_manifest(folder).content_id;

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
+#include <stdexcept>
+
 #include "loaders/pictures/box.h"
 #include "loaders/pictures/crop.h"
 #include "loaders/pictures/encode.h"
@@ -25,6 +27,14 @@ void store_crop(DecodedSample& sample, const cv::Mat& rgb, const cv::Mat& mask,
   sample.stored_crop = shards.images == "png" ? loaders::pictures::encode_png(crop.rgb)
                                               : loaders::pictures::encode_jpeg(crop.rgb, shards.jpeg_quality);
   if (!crop.mask.empty()) sample.stored_mask = loaders::pictures::encode_png(crop.mask);
+}
+
+// A picture that had a digest and is gone now (an unmounted disk) is no failed sample: it stops the run.
+void require_present(const candidates::Candidate& candidate, const DecodedSample& decoded) {
+  if (decoded.failure != Reason::image_missing || candidate.image_sha256.empty()) return;
+  throw std::runtime_error(
+      fmt::format("{}: the picture {} could be read before and cannot now ({}); put it back and build again",
+                  candidate.record.id, candidate.record.image_path, decoded.detail));
 }
 
 }  // namespace
@@ -77,6 +87,7 @@ void decode_unit(UnitWork& work, const config::ShardConfig& shards, const config
     if (run::interrupted()) return;
     if (const auto want = wanted(picture_facts(work, i, rules))) {
       work.decoded[i] = decode_sample(work.candidates[i].record, *want, shards);
+      require_present(work.candidates[i], work.decoded[i]);
     }
   });
 }
