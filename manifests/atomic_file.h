@@ -10,7 +10,7 @@
 namespace q3d::manifests {
 
 // Writes `content` to `path`. If this fails, the temporary file is removed, an older file at `path` stays as
-// it was, and std::runtime_error names the path and the system's reason (disk full, no permission, ...).
+// it was, and IoError (manifests/file_descriptor.h) names the path and the reason (disk full, ...).
 void write_file_atomically(const std::filesystem::path& path, std::span<const std::byte> content);
 void write_file_atomically(const std::filesystem::path& path, std::string_view content);
 
@@ -18,7 +18,8 @@ void write_file_atomically(const std::filesystem::path& path, std::string_view c
 // removed.
 void commit_file(const std::filesystem::path& temporary, const std::filesystem::path& path);
 
-std::string read_file(const std::filesystem::path& path);  // throws std::runtime_error
+// The whole content of a regular file. Throws IoError.
+std::string read_file(const std::filesystem::path& path);
 
 // Calls fsync on a folder, which makes the names in it durable. Throws std::runtime_error.
 void sync_folder(const std::filesystem::path& folder);

@@ -1,6 +1,5 @@
 #include "manifests/digest.h"
 
-#include <fcntl.h>
 #include <openssl/evp.h>
 
 #include <algorithm>
@@ -55,7 +54,7 @@ std::string sha256(std::string_view text) {
 
 std::string sha256_file(const std::filesystem::path& path) {
   constexpr std::uint64_t kBlock = 1 << 20;
-  const FileDescriptor file(path, O_RDONLY);
+  const FileDescriptor file = open_input(path);
   const std::uint64_t size = file.size();
   std::vector<std::byte> block(std::min(size, kBlock));
   Sha256 digest;

@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -17,7 +18,8 @@ namespace q3d::manifests {
 
 std::string sha256(std::span<const std::byte> bytes);  // 64 lower-case hex digits
 std::string sha256(std::string_view text);
-std::string sha256_file(const std::filesystem::path& path);  // throws std::runtime_error when unreadable
+// Reads the file in blocks. Throws IoError (manifests/file_descriptor.h) when it cannot be read.
+std::string sha256_file(const std::filesystem::path& path);
 
 // Computes the SHA-256 of bytes that come in pieces.
 class Sha256 {
@@ -42,7 +44,10 @@ class DigestCache {
   // Loads the file if it exists; damaged lines are dropped. Throws std::runtime_error if the file is
   // unreadable.
   explicit DigestCache(std::filesystem::path file);
-  std::string digest(const std::filesystem::path& path);  // throws std::runtime_error when unreadable
+  std::string digest(const std::filesystem::path& path);  // throws IoError when it cannot be read
+  // Returns nothing if there is no such file. Throws IoError if there is one that cannot be read, which says
+  // nothing about its content.
+  std::optional<std::string> digest_if_present(const std::filesystem::path& path);
   // Writes one checked line for each entry, sorted by path, atomically. Throws std::runtime_error.
   void save() const;
 

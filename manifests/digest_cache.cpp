@@ -95,6 +95,15 @@ std::string DigestCache::digest(const std::filesystem::path& path) {
   return digest;
 }
 
+std::optional<std::string> DigestCache::digest_if_present(const std::filesystem::path& path) {
+  try {
+    return digest(path);
+  } catch (const IoError& error) {
+    if (error.names_no_file()) return std::nullopt;
+    throw;
+  }
+}
+
 void DigestCache::save() const {
   std::string content;
   {

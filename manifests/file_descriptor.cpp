@@ -6,20 +6,52 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <stdexcept>
 #include <system_error>
 #include <utility>
 
 namespace q3d::manifests {
 
+namespace {
+
+int open_file(const std::filesystem::path& path, int flags) {
+  int descriptor = -1;
+  do {
+    descriptor = ::open(path.c_str(), flags | O_CLOEXEC, 0666);
+  } while (descriptor < 0 && errno == EINTR);
+  return descriptor;
+}
+
+}  // namespace
+
+bool names_no_file(int code) {
+  switch (code) {
+    case ENOENT:
+    case ENOTDIR:
+    case EISDIR:
+    case ELOOP:
+    case ENAMETOOLONG:
+    case ENXIO:  // a socket, or a device that is not there
+      return true;
+    default:
+      return false;
+  }
+}
+
+IoError::IoError(std::string_view doing, std::filesystem::path path, int code)
+    : IoError(doing, std::move(path), std::generic_category().message(code), code) {}
+
+IoError::IoError(std::string_view doing, std::filesystem::path path, std::string reason, int code)
+    : std::runtime_error(fmt::format("cannot {} {}: {}", doing, path.string(), reason)),
+      path_(std::move(path)),
+      reason_(std::move(reason)),
+      code_(code) {}
+
 void throw_errno(std::string_view doing, const std::filesystem::path& path) {
-  const int error = errno;
-  throw std::runtime_error(
-      fmt::format("cannot {} {}: {}", doing, path.string(), std::generic_category().message(error)));
+  throw IoError(doing, path, errno);
 }
 
 FileDescriptor::FileDescriptor(const std::filesystem::path& path, int flags)
-    : path_(path), descriptor_(::open(path.c_str(), flags | O_CLOEXEC, 0666)) {
+    : path_(path), descriptor_(open_file(path, flags)) {
   if (descriptor_ < 0) throw_errno((flags & O_CREAT) != 0 ? "create" : "open", path);
 }
 
@@ -65,8 +97,8 @@ void FileDescriptor::read_at(std::uint64_t offset, std::span<std::byte> bytes) c
       throw_errno("read", path_);
     }
     if (got == 0) {
-      throw std::runtime_error(fmt::format("cannot read {}: it ends {} bytes before byte {}", path_.string(),
-                                           bytes.size(), offset + bytes.size()));
+      throw IoError("read", path_,
+                    fmt::format("it ends {} bytes before byte {}", bytes.size(), offset + bytes.size()), 0);
     }
     offset += static_cast<std::uint64_t>(got);
     bytes = bytes.subspan(static_cast<std::size_t>(got));
@@ -74,11 +106,30 @@ void FileDescriptor::read_at(std::uint64_t offset, std::span<std::byte> bytes) c
 }
 
 void FileDescriptor::sync() const {
-  if (::fsync(descriptor_) != 0) throw_errno("sync", path_);
+  while (::fsync(descriptor_) != 0) {
+    if (errno != EINTR) throw_errno("sync", path_);
+  }
 }
 
 void FileDescriptor::close() {
   if (::close(std::exchange(descriptor_, -1)) != 0) throw_errno("close", path_);
+}
+
+FileDescriptor open_input(const std::filesystem::path& path) {
+  FileDescriptor file(path, O_RDONLY | O_NONBLOCK);
+  struct stat status {};
+  if (::fstat(file.get(), &status) != 0) throw_errno("inspect", path);
+  if (!S_ISREG(status.st_mode)) {
+    throw IoError("read", path, "got a folder, pipe or device, expected a file", EISDIR);
+  }
+  return file;
+}
+
+std::vector<std::byte> read_bytes(const std::filesystem::path& path) {
+  const FileDescriptor file = open_input(path);
+  std::vector<std::byte> bytes(file.size());
+  file.read_at(0, bytes);
+  return bytes;
 }
 
 }  // namespace q3d::manifests

@@ -5,17 +5,42 @@
 #include <cstdint>
 #include <filesystem>
 #include <span>
+#include <stdexcept>
+#include <string>
 #include <string_view>
+#include <vector>
 
 namespace q3d::manifests {
 
-// Throws std::runtime_error "cannot <doing> <path>: <reason of errno>".
+// True for an errno that means that there is no regular file of this name (ENOENT, ENOTDIR, EISDIR, ...).
+// Every other errno (EIO, ESTALE, EMFILE, EACCES, ...) says nothing about the file's content.
+bool names_no_file(int code);
+
+// The system refused an operation on a file. what() is "cannot <doing> <path>: <reason>".
+class IoError : public std::runtime_error {
+ public:
+  IoError(std::string_view doing, std::filesystem::path path, int code);  // the reason is errno's text
+  IoError(std::string_view doing, std::filesystem::path path, std::string reason, int code);
+
+  const std::filesystem::path& path() const { return path_; }
+  const std::string& reason() const { return reason_; }
+  int code() const { return code_; }  // an errno; 0 when the file ended before it should
+  bool names_no_file() const { return manifests::names_no_file(code_); }
+
+ private:
+  std::filesystem::path path_;
+  std::string reason_;
+  int code_;
+};
+
+// Throws IoError with the current errno.
 [[noreturn]] void throw_errno(std::string_view doing, const std::filesystem::path& path);
 
 class FileDescriptor {
  public:
   FileDescriptor() = default;
-  // Calls open(2) with O_CLOEXEC. A new file gets mode 0666 less the umask. Throws std::runtime_error.
+  // Calls open(2) with O_CLOEXEC. A new file gets mode 0666 less the umask. Throws IoError, as all members
+  // do.
   FileDescriptor(const std::filesystem::path& path, int flags);
   ~FileDescriptor();
   FileDescriptor(FileDescriptor&& other) noexcept;
@@ -38,5 +63,12 @@ class FileDescriptor {
   std::filesystem::path path_;
   int descriptor_ = -1;
 };
+
+// Opens a regular file for reading. Throws IoError; a folder, pipe or device names no file, and a named pipe
+// without a writer does not make the caller wait.
+FileDescriptor open_input(const std::filesystem::path& path);
+
+// The whole content of a regular file, read once. Throws IoError, also when the file shrinks meanwhile.
+std::vector<std::byte> read_bytes(const std::filesystem::path& path);
 
 }  // namespace q3d::manifests

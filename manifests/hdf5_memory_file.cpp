@@ -10,6 +10,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <stdexcept>
+#include <string_view>
 #include <utility>
 
 namespace q3d::manifests::hdf5 {
@@ -17,6 +18,9 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "tables are written from little-endian memory");
 
+// HDF5 first checks whether the name exists on disk. A name below /dev/null never does.
+constexpr const char* kNameOfNoFile = "/dev/null/table";
+constexpr std::string_view kSignature = "\x89HDF\r\n\x1a\n";
 constexpr std::size_t kGrowthBytes = 1 << 20;
 constexpr std::size_t kEndOfFileField = 28;  // HDF5 file format, superblock version 2 "End of File Address"
 
@@ -59,8 +63,7 @@ MemoryFile::MemoryFile() : memory_(std::make_unique<Memory>()) {
   check(H5Pset_libver_bounds(access.get(), H5F_LIBVER_V18, H5F_LIBVER_V18), "library version bounds");
   const Handle creation(H5Pcreate(H5P_FILE_CREATE), H5Pclose, "file creation properties");
   check(H5Pset_obj_track_times(creation.get(), false), "file creation properties");
-  // HDF5 first checks whether the name exists on disk. A name below /dev/null never does.
-  file_.emplace(H5Fcreate("/dev/null/table", H5F_ACC_TRUNC, creation.get(), access.get()), H5Fclose,
+  file_.emplace(H5Fcreate(kNameOfNoFile, H5F_ACC_TRUNC, creation.get(), access.get()), H5Fclose,
                 "in-memory file");
 }
 
@@ -116,6 +119,16 @@ FileImage MemoryFile::finish() {
                                          end_of_file, memory_->allocated));
   }
   return {std::exchange(memory_->bytes, nullptr), end_of_file};
+}
+
+Handle open_image(std::span<const std::byte> bytes) {
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  if (!text.starts_with(kSignature)) throw std::runtime_error("not an HDF5 file");
+  const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, "file access properties");
+  check(H5Pset_fapl_core(access.get(), kGrowthBytes, false), "in-memory driver");
+  auto* image = const_cast<std::byte*>(bytes.data());  // the library copies it and changes nothing
+  check(H5Pset_file_image(access.get(), image, bytes.size()), "in-memory driver");
+  return {H5Fopen(kNameOfNoFile, H5F_ACC_RDONLY, access.get()), H5Fclose, "cannot open"};
 }
 
 }  // namespace q3d::manifests::hdf5

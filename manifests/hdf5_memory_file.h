@@ -1,4 +1,5 @@
-// An HDF5 file that lives in memory until it is complete.
+// HDF5 files in memory: one that is written there until it is complete, and one whose bytes were read
+// already.
 #pragma once
 
 #include <cstddef>
@@ -57,5 +58,9 @@ class MemoryFile {
   std::unique_ptr<Memory> memory_;
   std::optional<Handle> file_;
 };
+
+// Opens the bytes of a whole HDF5 file for reading; the library makes its own copy. Use it while a Session
+// lives. Throws std::runtime_error.
+Handle open_image(std::span<const std::byte> bytes);
 
 }  // namespace q3d::manifests::hdf5

@@ -48,41 +48,40 @@ Journal::Journal(std::filesystem::path file) : file_(std::move(file)) {
   if (!std::filesystem::exists(file_)) return;
   const std::string content = read_file(file_);
   file_bytes_ = content.size();
+  std::string sound_lines;
   std::int64_t line_number = 0;
-  while (whole_bytes_ < content.size()) {
+  for (std::size_t at = 0; at < content.size();) {
     ++line_number;
-    const std::size_t end = content.find('\n', whole_bytes_);
-    const bool is_last = end == std::string::npos || end + 1 == content.size();
-    auto entry = end == std::string::npos
-                     ? std::nullopt
-                     : parse_line(std::string_view(content).substr(whole_bytes_, end - whole_bytes_));
-    if (!entry) {
-      if (!is_last) {
-        throw std::runtime_error(
-            fmt::format("{}, line {}: damaged (its checksum or its fields do not match). Delete this line "
-                        "and build again: "
-                        "the unit it stood for will be made anew.",
-                        file_.string(), line_number));
-      }
+    const std::size_t end = content.find('\n', at);
+    const std::size_t next = end == std::string::npos ? content.size() : end + 1;
+    auto entry =
+        end == std::string::npos ? std::nullopt : parse_line(std::string_view(content).substr(at, end - at));
+    if (entry) {
+      sound_lines.append(content, at, next - at);
+      const std::int64_t unit = entry->unit;
+      entries_.insert_or_assign(unit, std::move(*entry));
+    } else if (next == content.size()) {
       dropped_torn_line_ = true;
-      return;
+    } else {
+      damaged_lines_.push_back(line_number);
     }
-    const std::int64_t unit = entry->unit;
-    entries_.insert_or_assign(unit, std::move(*entry));
-    whole_bytes_ = end + 1;
+    at = next;
   }
+  whole_bytes_ = sound_lines.size();
+  if (!damaged_lines_.empty()) sound_lines_ = std::move(sound_lines);
 }
 
 std::optional<JournalEntry> Journal::find(std::int64_t unit, const std::string& input_digest) const {
   const auto found = entries_.find(unit);
   if (found == entries_.end() || found->second.input_digest != input_digest) return std::nullopt;
-  const JournalEntry& entry = found->second;
-  if (!entry.file.empty()) {
-    std::error_code error;
-    const auto size = std::filesystem::file_size(file_.parent_path() / entry.file, error);
-    if (error || size != static_cast<std::uintmax_t>(entry.bytes)) return std::nullopt;
-  }
-  return entry;
+  return found->second;
+}
+
+void Journal::repair() {
+  if (!sound_lines_) return;
+  write_file_atomically(file_, *sound_lines_);
+  file_bytes_ = sound_lines_->size();
+  sound_lines_.reset();
 }
 
 void Journal::append(const JournalEntry& entry) {
@@ -92,13 +91,15 @@ void Journal::append(const JournalEntry& entry) {
   }
   const std::string line = seal_line(to_payload(entry));
   const bool is_new = !std::filesystem::exists(file_);
-  FileDescriptor file(file_, O_WRONLY | O_CREAT | O_APPEND);
-  if (file.size() != file_bytes_) {
+  const std::uint64_t bytes_now = is_new ? 0 : std::filesystem::file_size(file_);
+  if (bytes_now != file_bytes_) {
     throw std::runtime_error(
         fmt::format("{}: grew from {} to {} bytes behind this process's back. Another build "
                     "writes it: end one of the two.",
-                    file_.string(), file_bytes_, file.size()));
+                    file_.string(), file_bytes_, bytes_now));
   }
+  repair();
+  FileDescriptor file(file_, O_WRONLY | O_CREAT | O_APPEND);
   const auto cut = [&] { return ::ftruncate(file.get(), static_cast<off_t>(whole_bytes_)) == 0; };
   if (file_bytes_ != whole_bytes_ && !cut()) throw_errno("cut a torn line off", file_);
   try {

@@ -6,6 +6,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace q3d::manifests {
 
@@ -19,30 +20,37 @@ struct JournalEntry {
 };
 
 // An append is fsynced before it returns. If the last line is torn because its writer was killed, loading
-// drops it and the next append cuts it off. A damaged line anywhere else throws std::runtime_error. Not
-// thread-safe: there must be one writer only.
+// drops it and the next append cuts it off. A damaged line anywhere else is dropped too, and the next append
+// first writes the file anew without it. Not thread-safe: there must be one writer only.
 class Journal {
  public:
-  // Loads the file if it exists; the first append creates it. Throws std::runtime_error that names file and
-  // line.
+  // Loads the file if it exists; the first append creates it. Throws IoError.
   explicit Journal(std::filesystem::path file);
 
-  // The latest entry of a unit, if its input digest is `input_digest` and its file is there with the right
-  // size.
+  // The latest entry of a unit, if its input digest is `input_digest`. Whether its file is sound is for the
+  // caller to find out.
   std::optional<JournalEntry> find(std::int64_t unit, const std::string& input_digest) const;
+  // Forgets a unit whose file turned out to be damaged. The journal's own file stays as it is.
+  void forget(std::int64_t unit) { entries_.erase(unit); }
   // Appends an entry. Throws std::runtime_error that names the file (disk full, ...), and leaves the journal
   // as it was. Throws std::invalid_argument if entry.file leaves the journal's folder.
   void append(const JournalEntry& entry);
   const std::map<std::int64_t, JournalEntry>& entries() const { return entries_; }
   // True if loading dropped a torn last line. Its unit will be made again.
   bool dropped_torn_line() const { return dropped_torn_line_; }
+  // Numbers, from 1 on, of the other lines that loading dropped: their checksum or their fields do not match.
+  const std::vector<std::int64_t>& damaged_lines() const { return damaged_lines_; }
 
  private:
+  void repair();
+
   std::filesystem::path file_;
   std::map<std::int64_t, JournalEntry> entries_;
   std::uint64_t whole_bytes_ = 0;  // size up to the end of the last complete line
   std::uint64_t file_bytes_ = 0;   // size of the file, including a torn last line
   bool dropped_torn_line_ = false;
+  std::vector<std::int64_t> damaged_lines_;
+  std::optional<std::string> sound_lines_;  // what the file is to hold, until repair() writes it
 };
 
 }  // namespace q3d::manifests

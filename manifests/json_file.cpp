@@ -5,31 +5,33 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <fstream>
+#include <span>
 #include <stdexcept>
 #include <string_view>
+
+#include "manifests/file_descriptor.h"
 
 namespace q3d::manifests {
 namespace {
 
 constexpr std::uintmax_t kMaxAnnotationBytes = std::uintmax_t{4} << 30U;
 
-std::string read_text(const std::filesystem::path& file) {
-  std::error_code error;
-  const auto size = std::filesystem::file_size(file, error);
-  if (error || !std::filesystem::is_regular_file(file)) {
-    throw std::runtime_error(fmt::format("{}: got {}, expected an annotation file", file.string(),
-                                         error ? error.message() : "something that is not a regular file"));
+std::string read_text(const std::filesystem::path& path) {
+  try {
+    const FileDescriptor file = open_input(path);
+    const std::uint64_t size = file.size();
+    if (size > kMaxAnnotationBytes) {
+      throw std::runtime_error(fmt::format("{}: got {} bytes, expected an annotation file of at most {}",
+                                           path.string(), size, kMaxAnnotationBytes));
+    }
+    std::string text(size, '\0');
+    file.read_at(0, std::as_writable_bytes(std::span(text)));
+    return text;
+  } catch (const IoError& error) {
+    if (!error.names_no_file()) throw;
+    throw std::runtime_error(
+        fmt::format("{}: {}, expected an annotation file", path.string(), error.reason()));
   }
-  if (size > kMaxAnnotationBytes) {
-    throw std::runtime_error(fmt::format("{}: got {} bytes, expected an annotation file of at most {}",
-                                         file.string(), size, kMaxAnnotationBytes));
-  }
-  std::string text(size, '\0');
-  std::ifstream stream(file, std::ios::binary);
-  stream.read(text.data(), static_cast<std::streamsize>(size));
-  if (!stream) throw std::runtime_error(fmt::format("{}: cannot be read", file.string()));
-  return text;
 }
 
 bool is_token_char(char c) {

@@ -9,7 +9,8 @@ namespace q3d::manifests {
 
 // Parses a file. Python writes numbers that JSON does not have: NaN, Infinity and numbers beyond the range of
 // double. They are accepted here (see is_beyond_json) and become a record's failure where they are read.
-// Throws std::runtime_error that names the file, the byte and line, what was found and what was expected.
+// Throws std::runtime_error that names the file, the byte and line, what was found and what was expected, and
+// IoError if the file exists and cannot be read.
 nlohmann::json read_json_file(const std::filesystem::path& file);
 
 // Returns the array `key` of a top-level object. Throws std::runtime_error that names the file, what was

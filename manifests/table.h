@@ -76,5 +76,8 @@ std::string write_table(const std::filesystem::path& path, const Table& table);
 // Reads the whole table. Throws std::runtime_error that names path and dataset, what was found and what was
 // expected.
 Table read_table(const std::filesystem::path& path);
+// The same for a file whose bytes the caller has read, so that it can digest the very bytes that are parsed.
+// `path` names the file in messages.
+Table read_table(const std::filesystem::path& path, std::vector<std::byte> bytes);
 
 }  // namespace q3d::manifests

@@ -1,6 +1,5 @@
 #include "manifests/table_layout.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,6 +9,7 @@
 #include <utility>
 
 #include "manifests/hdf5.h"
+#include "manifests/hdf5_memory_file.h"
 
 namespace q3d::manifests {
 namespace {
@@ -149,7 +149,7 @@ std::map<std::string, std::string> read_attributes(hid_t file, std::uint64_t fil
   return attributes;
 }
 
-std::vector<std::int64_t> read_offsets(const FileDescriptor& file, const std::string& name, std::int64_t rows,
+std::vector<std::int64_t> read_offsets(const TableContent& file, const std::string& name, std::int64_t rows,
                                        const Layout& offsets, std::int64_t flat_bytes) {
   if (offsets.type != ElementType::int64 || offsets.extents.size() != 1 || offsets.extents[0] - 1 != rows) {
     refuse(name + "_offsets", fmt::format("expected {} rows + 1 of int64", rows));
@@ -178,7 +178,7 @@ TableReader::Column make_column(const std::string& name, std::int64_t rows, cons
   return column;
 }
 
-std::map<std::string, TableReader::Column> read_columns(hid_t hdf5_file, const FileDescriptor& file,
+std::map<std::string, TableReader::Column> read_columns(hid_t hdf5_file, const TableContent& file,
                                                         std::int64_t rows) {
   const std::uint64_t file_bytes = file.size();
   std::map<std::string, Layout> layouts;
@@ -211,7 +211,9 @@ std::map<std::string, TableReader::Column> read_columns(hid_t hdf5_file, const F
   return columns;
 }
 
-Handle open_hdf5(const std::filesystem::path& path) {
+Handle open_hdf5(const TableContent& content) {
+  if (const auto bytes = content.in_memory()) return hdf5::open_image(*bytes);
+  const std::filesystem::path& path = content.path();
   if (H5Fis_hdf5(path.c_str()) <= 0) throw std::runtime_error("not an HDF5 file");
   const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, "file access properties");
   // Published shards may lie on read-only or network file systems, where HDF5's own locking fails.
@@ -219,33 +221,35 @@ Handle open_hdf5(const std::filesystem::path& path) {
   return {H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.get()), H5Fclose, "cannot open"};
 }
 
-// Calls `read(HDF5 file)` and puts the path before the message of what it throws.
+// Calls `read(HDF5 file)` and puts the path before the message of what it throws, unless that names it.
 template <typename Read>
-auto with_hdf5(const std::filesystem::path& path, Read read) {
+auto with_hdf5(const TableContent& content, Read read) {
   const hdf5::Session session;
   try {
-    const Handle file = open_hdf5(path);
+    const Handle file = open_hdf5(content);
     return read(file.get());
+  } catch (const IoError&) {
+    throw;
   } catch (const std::runtime_error& error) {
-    throw std::runtime_error(fmt::format("{}: {}", path.string(), error.what()));
+    throw std::runtime_error(fmt::format("{}: {}", content.path().string(), error.what()));
   }
 }
 
 }  // namespace
 
-TableLayout read_table_layout(const FileDescriptor& file) {
-  return with_hdf5(file.path(), [&](hid_t hdf5_file) {
+TableLayout read_table_layout(const TableContent& content) {
+  return with_hdf5(content, [&](hid_t hdf5_file) {
     TableLayout layout;
     layout.rows = read_rows(hdf5_file);
-    layout.attributes = read_attributes(hdf5_file, file.size());
-    layout.columns = read_columns(hdf5_file, file, layout.rows);
+    layout.attributes = read_attributes(hdf5_file, content.size());
+    layout.columns = read_columns(hdf5_file, content, layout.rows);
     return layout;
   });
 }
 
 std::map<std::string, std::string> read_table_attributes(const std::filesystem::path& path) {
-  const FileDescriptor file(path, O_RDONLY);
-  return with_hdf5(path, [&](hid_t hdf5_file) { return read_attributes(hdf5_file, file.size()); });
+  const TableContent content(path);
+  return with_hdf5(content, [&](hid_t hdf5_file) { return read_attributes(hdf5_file, content.size()); });
 }
 
 }  // namespace q3d::manifests

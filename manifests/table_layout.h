@@ -15,7 +15,7 @@ struct TableLayout {
   std::map<std::string, TableReader::Column> columns;
 };
 
-// Opens the file a second time, with HDF5, and makes all the checks that TableReader promises.
-TableLayout read_table_layout(const FileDescriptor& file);
+// Opens the content with HDF5, a file a second time, and makes all the checks that TableReader promises.
+TableLayout read_table_layout(const TableContent& content);
 
 }  // namespace q3d::manifests

@@ -1,17 +1,19 @@
 #include "manifests/table_reader.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 
 #include <array>
 #include <stdexcept>
+#include <utility>
 
 #include "manifests/table_layout.h"
 
 namespace q3d::manifests {
 
-TableReader::TableReader(const std::filesystem::path& path) : file_(path, O_RDONLY) {
-  TableLayout layout = read_table_layout(file_);
+TableReader::TableReader(const std::filesystem::path& path) : TableReader(TableContent(path)) {}
+
+TableReader::TableReader(TableContent content) : content_(std::move(content)) {
+  TableLayout layout = read_table_layout(content_);
   rows_ = layout.rows;
   attributes_ = std::move(layout.attributes);
   columns_ = std::move(layout.columns);
@@ -40,7 +42,7 @@ NumericColumn TableReader::numeric(const std::string& name, std::int64_t first, 
   const Column& column = find(name, Kind::numeric, first, count);
   NumericColumn values{column.type, column.row_shape,
                        std::vector<std::byte>(static_cast<std::size_t>(count * column.row_bytes))};
-  file_.read_at(column.file_offset + static_cast<std::uint64_t>(first * column.row_bytes), values.data);
+  content_.read_at(column.file_offset + static_cast<std::uint64_t>(first * column.row_bytes), values.data);
   return values;
 }
 
@@ -49,8 +51,8 @@ std::vector<std::string> TableReader::text(const std::string& name, std::int64_t
   const Column& column = find(name, Kind::text, first, count);
   const auto width = static_cast<std::size_t>(column.row_bytes);
   std::string padded(static_cast<std::size_t>(count) * width, '\0');
-  file_.read_at(column.file_offset + static_cast<std::uint64_t>(first * column.row_bytes),
-                std::as_writable_bytes(std::span(padded)));
+  content_.read_at(column.file_offset + static_cast<std::uint64_t>(first * column.row_bytes),
+                   std::as_writable_bytes(std::span(padded)));
   std::vector<std::string> values;
   values.reserve(static_cast<std::size_t>(count));
   for (std::size_t at = 0; at < padded.size(); at += width) {
@@ -68,13 +70,14 @@ std::vector<std::vector<std::byte>> TableReader::blobs(const std::string& name, 
   for (auto row = static_cast<std::size_t>(first); row < static_cast<std::size_t>(first + count); ++row) {
     const std::int64_t begin = column.blob_offsets[row];
     values.emplace_back(static_cast<std::size_t>(column.blob_offsets[row + 1] - begin));
-    file_.read_at(column.file_offset + static_cast<std::uint64_t>(begin), values.back());
+    content_.read_at(column.file_offset + static_cast<std::uint64_t>(begin), values.back());
   }
   return values;
 }
 
-Table read_table(const std::filesystem::path& path) {
-  const TableReader reader(path);
+namespace {
+
+Table read_whole(const TableReader& reader) {
   Table table;
   table.rows = reader.rows();
   table.attributes = reader.attributes();
@@ -92,6 +95,16 @@ Table read_table(const std::filesystem::path& path) {
     }
   }
   return table;
+}
+
+}  // namespace
+
+Table read_table(const std::filesystem::path& path) {
+  return read_whole(TableReader(path));
+}
+
+Table read_table(const std::filesystem::path& path, std::vector<std::byte> bytes) {
+  return read_whole(TableReader(TableContent(path, std::move(bytes))));
 }
 
 }  // namespace q3d::manifests

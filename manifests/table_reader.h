@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "manifests/file_descriptor.h"
 #include "manifests/table.h"
+#include "manifests/table_content.h"
 
 namespace q3d::manifests {
 
@@ -17,7 +17,7 @@ namespace q3d::manifests {
 // std::runtime_error that names the path if it is not a readable HDF5 file.
 std::map<std::string, std::string> read_table_attributes(const std::filesystem::path& path);
 
-// The constructor uses HDF5 to find out where each column lies. The rows are then read from the file
+// The constructor uses HDF5 to find out where each column lies. The rows are then read from the content
 // directly. Reads therefore take no lock, may run in many threads, and survive a fork.
 class TableReader {
  public:
@@ -35,8 +35,9 @@ class TableReader {
   // lies inside the file. Throws std::runtime_error that names path and dataset, what was found and what was
   // expected.
   explicit TableReader(const std::filesystem::path& path);
+  explicit TableReader(TableContent content);
 
-  const std::filesystem::path& path() const { return file_.path(); }
+  const std::filesystem::path& path() const { return content_.path(); }
   std::int64_t rows() const { return rows_; }
   const std::map<std::string, std::string>& attributes() const { return attributes_; }
   const std::map<std::string, Column>& columns() const { return columns_; }
@@ -51,7 +52,7 @@ class TableReader {
  private:
   const Column& find(const std::string& name, Kind kind, std::int64_t first, std::int64_t count) const;
 
-  FileDescriptor file_;
+  TableContent content_;
   std::int64_t rows_ = 0;
   std::map<std::string, std::string> attributes_;
   std::map<std::string, Column> columns_;

@@ -5,23 +5,28 @@
 
 #include <algorithm>
 #include <array>
-#include <fstream>
+#include <span>
 #include <stdexcept>
 #include <string_view>
 #include <utility>
+
+#include "manifests/file_descriptor.h"
 
 namespace q3d::loaders::formats {
 
 bool is_hdf5(const std::filesystem::path& file) {
   constexpr std::string_view kSignature = "\x89HDF\r\n\x1a\n";
-  std::array<char, kSignature.size()> start{};
-  std::ifstream stream(file, std::ios::binary);
-  if (!std::filesystem::is_regular_file(file) || !stream) {
+  try {
+    const manifests::FileDescriptor opened = manifests::open_input(file);
+    std::array<char, kSignature.size()> start{};
+    if (opened.size() < start.size()) return false;
+    opened.read_at(0, std::as_writable_bytes(std::span(start)));
+    return std::string_view(start.data(), start.size()) == kSignature;
+  } catch (const manifests::IoError& error) {
+    if (!error.names_no_file()) throw;
     throw std::runtime_error(
-        fmt::format("{}: got a file that cannot be read, expected DeepLabCut's .h5 or .csv", file.string()));
+        fmt::format("{}: {}, expected DeepLabCut's .h5 or .csv", file.string(), error.reason()));
   }
-  stream.read(start.data(), start.size());
-  return stream && std::string_view(start.data(), start.size()) == kSignature;
 }
 
 LabelTable read_label_table(const std::filesystem::path& file) {

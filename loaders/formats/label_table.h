@@ -30,6 +30,7 @@ struct LabelTable {
 
 // Reads a table, HDF5 or CSV, recognised by content. Throws std::runtime_error that names file and place,
 // what was found and what was expected.
+// Throws manifests::IoError if the file exists and cannot be read.
 LabelTable read_label_table(const std::filesystem::path& file);
 bool is_hdf5(const std::filesystem::path& file);
 

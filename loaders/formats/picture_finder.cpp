@@ -5,7 +5,10 @@
 #include <algorithm>
 #include <cctype>
 #include <stdexcept>
+#include <system_error>
 #include <utility>
+
+#include "manifests/file_descriptor.h"
 
 namespace q3d::loaders::formats {
 namespace {
@@ -42,6 +45,13 @@ std::string folded(const fs::path& path) {
     if (text.ends_with(ending)) return text.substr(0, text.size() - ending.size()) + ".jpg";
   }
   return text;
+}
+
+// An error that says nothing about whether the file is there must not make its picture a missing one.
+void require_answer(const std::error_code& error, const char* doing, const fs::path& path) {
+  if (error && !manifests::names_no_file(error.value())) {
+    throw manifests::IoError(doing, path, error.value());
+  }
 }
 
 fs::path without_first(const fs::path& path) {
@@ -121,13 +131,15 @@ std::optional<FoundPicture> PictureFinder::by_spelling(const fs::path& relative)
   if (!spellings_) {
     spellings_.emplace();
     std::error_code error;
-    for (fs::recursive_directory_iterator it(bases_.front(), error), end; !error && it != end;
+    const auto options = fs::directory_options::skip_permission_denied;
+    for (fs::recursive_directory_iterator it(bases_.front(), options, error), end; !error && it != end;
          it.increment(error)) {
       std::error_code ignored;
       if (!it->is_directory(ignored)) {
         (*spellings_)[folded(it->path().lexically_relative(bases_.front()))].push_back(it->path());
       }
     }
+    require_answer(error, "list", bases_.front());
   }
   const auto found = spellings_->find(folded(relative));
   if (found == spellings_->end()) return std::nullopt;
@@ -146,10 +158,12 @@ std::optional<FoundPicture> PictureFinder::by_spelling(const fs::path& relative)
 std::optional<FoundPicture> PictureFinder::existing(const fs::path& path) {
   std::error_code error;
   const fs::file_status own = fs::symlink_status(path, error);
+  require_answer(error, "inspect", path);
   if (error || !fs::exists(own) || fs::is_directory(own)) return std::nullopt;
   fs::path resolved;
   if (fs::is_symlink(own)) {
     resolved = fs::canonical(path, error);
+    require_answer(error, "resolve the link", path);
     if (error) {
       return FoundPicture{{}, Reason::image_missing, fmt::format("{}, a link to nothing", path.string())};
     }
@@ -159,6 +173,7 @@ std::optional<FoundPicture> PictureFinder::existing(const fs::path& path) {
     // component.
     fs::path& folder = resolved_folders_[path.parent_path().string()];
     if (folder.empty()) folder = fs::canonical(path.parent_path(), error);
+    require_answer(error, "resolve", path.parent_path());
     resolved = folder / path.filename();
   }
   if (!is_allowed(resolved)) {

@@ -35,6 +35,7 @@ class PictureFinder {
   PictureFinder(const std::filesystem::path& root, const std::filesystem::path& images,
                 const std::filesystem::path& default_images);
 
+  // Throws manifests::IoError if the system does not say whether a file is there (EIO, EACCES, ...).
   FoundPicture find(const std::string& name);
 
   std::size_t found_by_tail() const { return found_by_tail_; }          // absolute names from another disk

@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <cstring>
-#include <fstream>
+#include <new>
 #include <string_view>
 
 #include "loaders/pictures/jpeg.h"
 #include "loaders/pictures/png.h"
+#include "manifests/file_descriptor.h"
 
 namespace q3d::loaders::pictures {
 namespace {
@@ -89,42 +89,34 @@ MaskKind kind_of(const cv::Mat& grey) {
 }  // namespace
 
 FileBytes read_picture_file(const std::filesystem::path& path) {
-  std::error_code error;
-  const auto status = std::filesystem::status(path, error);
-  if (!std::filesystem::exists(status)) {
-    return {{},
-            Reason::image_missing,
-            fmt::format("{}: {}", path.string(), error ? error.message() : "no such file")};
+  try {
+    const manifests::FileDescriptor file = manifests::open_input(path);
+    const std::uint64_t size = file.size();
+    if (size > kMaxFileBytes) {
+      return {{},
+              Reason::image_too_large,
+              fmt::format("{}: got {} bytes, expected at most {}", path.string(), size, kMaxFileBytes)};
+    }
+    FileBytes content;
+    content.bytes.resize(size);
+    file.read_at(0, content.bytes);
+    return content;
+  } catch (const manifests::IoError& error) {
+    if (!error.names_no_file()) throw;
+    const Reason reason = error.code() == EISDIR ? Reason::image_not_an_image : Reason::image_missing;
+    return {{}, reason, fmt::format("{}: {}", path.string(), error.reason())};
   }
-  if (!std::filesystem::is_regular_file(status)) {
-    return {{},
-            Reason::image_not_an_image,
-            fmt::format("{}: got a folder or device, expected a file", path.string())};
-  }
-  const auto size = std::filesystem::file_size(path, error);
-  if (!error && size > kMaxFileBytes) {
-    return {{},
-            Reason::image_too_large,
-            fmt::format("{}: got {} bytes, expected at most {}", path.string(), size, kMaxFileBytes)};
-  }
-  FileBytes file;
-  std::ifstream stream(path, std::ios::binary);
-  if (!error && stream) {
-    file.bytes.resize(size);
-    stream.read(reinterpret_cast<char*>(file.bytes.data()), static_cast<std::streamsize>(size));
-  }
-  if (error || !stream) {
-    return {{},
-            Reason::image_missing,
-            fmt::format("{}: cannot be read: {}", path.string(), std::strerror(errno))};
-  }
-  return file;
 }
 
 DecodedImage decode_image(std::span<const std::byte> bytes) {
   if (bytes.empty()) return {{}, Reason::image_empty, "got an empty file"};
-  if (is_jpeg(bytes)) return decode_jpeg(bytes);
-  if (is_png(bytes)) return decode_png(bytes);
+  try {
+    if (is_jpeg(bytes)) return decode_jpeg(bytes);
+    if (is_png(bytes)) return decode_png(bytes);
+  } catch (const cv::Exception& error) {
+    if (error.code == cv::Error::StsNoMem) throw std::bad_alloc();
+    throw;
+  }
   return unreadable(bytes);
 }
 

@@ -26,8 +26,9 @@ struct FileBytes {
   std::string detail;  // for people: what was found
 };
 
-// Reads a whole file, so that a caller can digest the very bytes that it decodes. Never throws for a bad
-// file.
+// Reads a whole file, so that a caller can digest the very bytes that it decodes. A file that is missing, too
+// large or not a regular file is a failure. Throws manifests::IoError if a file exists and cannot be read:
+// such an error (EIO, ESTALE, EMFILE, EACCES, ...) says nothing about the picture.
 FileBytes read_picture_file(const std::filesystem::path& path);
 
 struct DecodedImage {
@@ -38,8 +39,9 @@ struct DecodedImage {
 
 // Decodes a picture. Grey, palette, alpha, 16-bit and CMYK pictures become 8-bit RGB as with PIL's
 // convert('RGB'): alpha is dropped, and CMYK is read as Adobe's inverted kind. There is one difference: of
-// 16-bit grey the high byte is kept, where PIL clips at 255 and gives a white picture. Never throws for a bad
-// picture.
+// 16-bit grey the high byte is kept, where PIL clips at 255 and gives a white picture. A bad
+// picture is a failure and never throws. Throws std::bad_alloc if memory runs out. Where it reads the file
+// itself, it also throws as read_picture_file does.
 DecodedImage decode_image(std::span<const std::byte> bytes);
 DecodedImage decode_image(const std::filesystem::path& path);
 
@@ -61,7 +63,7 @@ struct DecodedMask {
 };
 
 // Decodes a mask. Grey values are those of PIL's convert('L'). An empty path is an absent mask; a path that
-// cannot be read is a failure.
+// names no file is a failure. Throws as decode_image does.
 DecodedMask decode_mask(std::span<const std::byte> bytes);
 DecodedMask decode_mask(const std::filesystem::path& path);
 

@@ -5,6 +5,8 @@
 #include <array>
 #include <csetjmp>
 #include <cstdio>  // jpeglib.h needs FILE and size_t
+#include <memory>
+#include <new>
 
 #include <jpeglib.h>
 
@@ -81,6 +83,7 @@ bool run(Decoder& decoder, void (*step)(Decoder&)) {
 }
 
 DecodedImage failed(const Decoder& decoder) {
+  if (decoder.errors.msg_code == JERR_OUT_OF_MEMORY) throw std::bad_alloc();  // no fault of the picture
   if (decoder.ended_early) return {{}, Reason::image_truncated, "the JPEG data end before the picture does"};
   if (decoder.too_many_scans) {
     return {{}, Reason::image_too_large, fmt::format("got a JPEG with more than {} scans", kMaxScans)};
@@ -139,9 +142,9 @@ DecodedImage decode_jpeg(std::span<const std::byte> bytes) {
   decoder.errors.error_exit = on_error;
   decoder.errors.emit_message = on_message;
   decoder.progress.progress_monitor = on_progress;
-  DecodedImage decoded = decode_with(decoder);
-  jpeg_destroy_decompress(&decoder.info);
-  return decoded;
+  const std::unique_ptr<jpeg_decompress_struct, void (*)(jpeg_decompress_struct*)> guard(
+      &decoder.info, jpeg_destroy_decompress);
+  return decode_with(decoder);
 }
 
 }  // namespace q3d::loaders::pictures

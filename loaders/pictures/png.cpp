@@ -91,6 +91,7 @@ DecodedImage decode_plain(const std::vector<unsigned char>& file) {
     cv::cvtColor(image, image, cv::COLOR_BGR2RGB);
     return {image, Reason::none, {}};
   } catch (const cv::Exception& error) {
+    if (error.code == cv::Error::StsNoMem) throw;  // no fault of the picture
     return damaged(error.err);
   }
 }

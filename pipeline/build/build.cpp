@@ -54,7 +54,14 @@ class UnitBuilder {
     unit::UnitFlow flow;
     flow.units = static_cast<std::int64_t>(workspace_.ingest().units.size());
     flow.read = [this](std::int64_t index) { return read(index); };
-    flow.decode = [this](unit::UnitWork& work) { unit::decode_unit(work, config_.shards, &rules_); };
+    flow.decode = [this](unit::UnitWork& work) {
+      // Here, because several units are decoded at once: these read whole files.
+      work.shard_before = shards_.has(*work.unit);
+      if (!work.shard_before) {
+        if (auto table = crops_.load(*work.unit)) work.crops = unit::crops_from_table(std::move(*table));
+      }
+      unit::decode_unit(work, config_.shards, &rules_);
+    };
     flow.compute = [this](unit::UnitWork& work) { compute(work); };
     flow.encode = [this](unit::UnitWork& work) { unit::encode_crops(work, config_.shards); };
     flow.write = [this](unit::UnitWork& work) { write(work); };
@@ -62,7 +69,7 @@ class UnitBuilder {
   }
 
   const std::vector<manifests::Judgement>& judgements() const { return judgements_; }
-  const stages::StageStore& shards() const { return shards_; }
+  stages::StageStore& shards() { return shards_; }
   std::int64_t crops_encoded() const { return crops_encoded_; }
 
  private:
@@ -78,10 +85,6 @@ class UnitBuilder {
     work->predicted_before = work->predicted.has_value();
     work->refined_before = work->refined.has_value();
     work->measured_before = work->measured.has_value();
-    work->shard_before = shards_.has(*work->unit);
-    if (!work->shard_before) {
-      if (auto table = crops_.load(*work->unit)) work->crops = unit::crops_from_table(std::move(*table));
-    }
     if (work->predicted) unit::judge_unit(*work, rules_);
     return work;
   }
@@ -154,7 +157,8 @@ BuildSummary build(const config::BuildConfig& config, const run::RunOptions& opt
 
   BuildSummary summary;
   summary.folder = version_folder(options.out, config, keys);
-  summary.was_up_to_date = is_published(summary.folder, keys);
+  summary.was_up_to_date = is_published(summary.folder, keys, workspace.digests());
+  workspace.digests().save();
   if (!summary.was_up_to_date) {
     UnitBuilder units(config, rules, keys, workspace);
     units.run();

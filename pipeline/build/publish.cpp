@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <nlohmann/json.hpp>
 #include <stdexcept>
 
 #include "manifests/atomic_file.h"
@@ -14,21 +15,24 @@ namespace fs = std::filesystem;
 constexpr fs::perms kReadOnly = fs::perms::owner_read | fs::perms::group_read | fs::perms::others_read;
 
 // A hard link where the file system has them, so that versions that share a shard share its bytes; else a
-// copy.
+// copy. A file that is there under another name than `from` (a damaged one, say) is replaced in one step.
 void link_or_copy(const fs::path& from, const fs::path& to) {
   std::error_code error;
-  fs::remove(to, error);
-  fs::create_hard_link(from, to, error);
-  if (error) {
+  if (!fs::equivalent(from, to, error)) {
     const fs::path temporary = to.string() + ".tmp";
-    fs::copy_file(from, temporary, fs::copy_options::overwrite_existing);
-    manifests::commit_file(temporary, to);
+    fs::create_hard_link(from, temporary, error);
+    if (error) {
+      fs::copy_file(from, temporary, fs::copy_options::overwrite_existing);
+      manifests::commit_file(temporary, to);
+    } else {
+      fs::rename(temporary, to);  // its bytes were made durable when the stage wrote them
+    }
   }
   fs::permissions(to, kReadOnly, error);  // immutable as far as a plain user goes
 }
 
 std::vector<dataset::ShardEntry> link_shards(const fs::path& folder, const candidates::Ingest& ingest,
-                                             const stages::StageStore& shards) {
+                                             stages::StageStore& shards) {
   fs::create_directories(folder / "shards");
   manifests::remove_temporaries(folder);  // what a build that was killed while it published left
   manifests::remove_temporaries(folder / "shards");
@@ -68,8 +72,13 @@ fs::path version_folder(const fs::path& out, const config::BuildConfig& config,
   return out / (config.name + "-" + keys.dataset.substr(0, stages::kShortKey));
 }
 
-bool is_published(const fs::path& folder, const stages::StageKeys& keys) {
+bool is_published(const fs::path& folder, const stages::StageKeys& keys, manifests::DigestCache& digests) {
   if (!fs::exists(folder / "dataset.json")) return false;
+  if (!nlohmann::json::accept(manifests::read_file(folder / "dataset.json"))) {
+    run::log_warning(fmt::format("{}: damaged: it is not readable JSON; it is published again",
+                                 (folder / "dataset.json").string()));
+    return false;
+  }
   const dataset::DatasetManifest manifest = dataset::read_dataset_manifest(folder);
   if (manifest.key != keys.dataset) {
     throw std::runtime_error(
@@ -77,16 +86,21 @@ bool is_published(const fs::path& folder, const stages::StageKeys& keys) {
                     "written over. Build into another folder",
                     folder.string(), manifest.key, keys.dataset));
   }
-  for (const dataset::ShardEntry& shard : manifest.shards) {
-    std::error_code error;
-    if (static_cast<std::int64_t>(fs::file_size(folder / shard.file, error)) != shard.bytes || error)
-      return false;
-  }
-  return true;
+  bool is_sound = true;
+  const auto compare = [&](const fs::path& file, const std::string& expected) {
+    const auto got = digests.digest_if_present(file);
+    if (got == expected) return;
+    is_sound = false;
+    run::log_warning(fmt::format("{}: damaged: {}, expected {} by dataset.json; it is published again",
+                                 file.string(), got ? "got SHA-256 " + *got : "it is gone", expected));
+  };
+  for (const dataset::ShardEntry& shard : manifest.shards) compare(folder / shard.file, shard.sha256);
+  compare(folder / "verdicts.csv", manifest.verdicts_sha256);
+  return is_sound;
 }
 
 void publish(const fs::path& folder, const dataset::DatasetInputs& inputs,
-             const std::vector<manifests::Judgement>& judgements, const stages::StageStore& shards) {
+             const std::vector<manifests::Judgement>& judgements, stages::StageStore& shards) {
   const candidates::Ingest& ingest = *inputs.ingest;
   const std::vector<dataset::ShardEntry> entries = link_shards(folder, ingest, shards);
   check_sums(ingest, judgements, entries);

@@ -32,6 +32,7 @@ class Workspace {
   // Empty, like the digests of assets(), when no dataset needs the network.
   const std::string& device_key() const { return device_key_; }
   bool quiet() const { return options_.quiet; }
+  manifests::DigestCache& digests() { return digests_; }
 
   // The thread on which the network lives.
   device::DeviceWorker& device() { return device_; }

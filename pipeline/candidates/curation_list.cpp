@@ -6,6 +6,7 @@
 
 #include "manifests/atomic_file.h"
 #include "manifests/csv.h"
+#include "manifests/file_descriptor.h"
 #include "pipeline/run/errors.h"
 
 namespace q3d::pipeline::candidates {
@@ -54,6 +55,9 @@ std::map<std::string, std::string> chosen_pictures(const std::filesystem::path& 
                                                    const std::string& split) {
   try {
     return read_chosen(list, split);
+  } catch (const manifests::IoError& error) {
+    if (!error.names_no_file()) throw;
+    throw run::ConfigError(fmt::format("curation: {}", error.what()));
   } catch (const std::runtime_error& error) {
     throw run::ConfigError(fmt::format("curation: {}", error.what()));
   }

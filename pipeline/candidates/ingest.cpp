@@ -53,22 +53,20 @@ void check_role(config::Role role, manifests::SampleRecord& record) {
       "pose: got nothing, or zeros throughout; expected 35 rotations, since the dataset's role is \"truth\"";
 }
 
-// A picture that cannot be read now is a failed sample, never a failed build; a mask is then none.
+// A picture that is not there is a failed sample, never a failed build; a mask is then none. A file that is
+// there and cannot be read stops the run.
 void digest_pictures(std::vector<Candidate>& candidates, manifests::DigestCache& digests) {
   tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t i) {
     Candidate& candidate = candidates[i];
     if (candidate.record.failure != Reason::none || run::interrupted()) return;
-    try {
-      candidate.image_sha256 = digests.digest(candidate.record.image_path);
-    } catch (const std::runtime_error&) {
+    if (auto digest = digests.digest_if_present(candidate.record.image_path)) {
+      candidate.image_sha256 = std::move(*digest);
+    } else {
       candidate.record.failure = Reason::image_missing;
       candidate.record.failure_detail = candidate.record.image_ref + " cannot be read";
     }
     if (candidate.record.mask_path.empty()) return;
-    try {
-      candidate.mask_sha256 = digests.digest(candidate.record.mask_path);
-    } catch (const std::runtime_error&) {  // decoding tells
-    }
+    candidate.mask_sha256 = digests.digest_if_present(candidate.record.mask_path).value_or("");
   });
   run::throw_if_interrupted();
 }

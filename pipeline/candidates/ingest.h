@@ -24,8 +24,8 @@ struct Exclusion {
 
 struct Candidate {
   manifests::SampleRecord record;
-  std::string image_sha256;                  // empty when the picture could not be read
-  std::string mask_sha256;                   // empty when there is none, or it could not be read
+  std::string image_sha256;                  // empty when the picture is not there
+  std::string mask_sha256;                   // empty when there is none, or its file is not there
   config::Role role = config::Role::pseudo;  // its dataset's
   std::string finding;  // of the check of its body, for people; empty where there is nothing to tell
   Exclusion exclusion{};
@@ -63,7 +63,8 @@ struct Ingest {
 
 // Loads every dataset and digests every picture (in parallel; unchanged files come from the cache). A record
 // whose role asks for a body and that gives no pose is failed. Throws std::runtime_error for an
-// annotation file that cannot be read, Interrupted. `load_bodies` is called for datasets with a body model;
+// annotation file that cannot be read, manifests::IoError for a picture or mask that is there and cannot be
+// read, and Interrupted. `load_bodies` is called for datasets with a body model;
 // an empty one leaves their bodies unchecked, for callers that look at pictures alone.
 Ingest ingest(const config::BuildConfig& config, manifests::DigestCache& digests,
               const device::BodyMeshesLoader& load_bodies);

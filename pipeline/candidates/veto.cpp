@@ -7,6 +7,7 @@
 
 #include "manifests/atomic_file.h"
 #include "manifests/digest.h"
+#include "manifests/file_descriptor.h"
 #include "pipeline/run/errors.h"
 
 namespace q3d::pipeline::candidates {
@@ -15,7 +16,8 @@ namespace {
 std::string read_text(const std::filesystem::path& file) {
   try {
     return manifests::read_file(file);
-  } catch (const std::runtime_error& error) {
+  } catch (const manifests::IoError& error) {
+    if (!error.names_no_file()) throw;
     throw run::ConfigError(fmt::format("veto: {}", error.what()));
   }
 }

@@ -7,6 +7,7 @@
 
 #include <array>
 #include <functional>
+#include <string>
 #include <string_view>
 
 namespace q3d::pipeline::cli {

@@ -5,6 +5,7 @@
 #include <opencv2/core.hpp>
 
 #include <algorithm>
+#include <cerrno>
 #include <cstdio>
 #include <new>
 #include <stdexcept>
@@ -12,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "manifests/file_descriptor.h"
 #include "pipeline/cli/stderr_log.h"
 #include "pipeline/run/errors.h"
 #include "pipeline/run/interrupt.h"
@@ -23,6 +25,25 @@ namespace {
 constexpr int kFailure = 1;
 constexpr int kUsage = 2;
 constexpr int kInterrupted = 130;
+
+// What a person can do about an errno.
+const char* advice(int code) {
+  switch (code) {
+    case EACCES:
+    case EPERM:
+      return " (give this user permission for it)";
+    case EMFILE:
+    case ENFILE:
+      return " (raise the limit of open files, `ulimit -n`)";
+    case ENOMEM:
+      return " (free some memory)";
+    case ENOSPC:
+    case EDQUOT:
+      return " (free some disk space)";
+    default:
+      return " (check the disk or the network mount)";
+  }
+}
 
 // Adds every command in the order of kCommands; returns those that this program can run.
 std::vector<std::pair<std::string, Command>> add_commands(CLI::App& app,
@@ -90,6 +111,14 @@ int run_program(int argc, char** argv, std::span<const CommandEntry> entries) {
   } catch (const run::ConfigError& error) {
     fmt::print(stderr, "quadruped3d: {}\n", error.what());
     return kUsage;
+  } catch (const manifests::IoError& error) {
+    if (error.names_no_file()) {
+      fmt::print(stderr, "quadruped3d: {}\n", error.what());
+    } else {
+      fmt::print(stderr, "quadruped3d: {}{}; nothing was recorded for it; run the same command again\n",
+                 error.what(), advice(error.code()));
+    }
+    return kFailure;
   } catch (const std::bad_alloc&) {
     fmt::print(stderr,
                "quadruped3d: out of memory; use a smaller network.batch, tta.batch or shards.unit_size\n");

@@ -35,7 +35,9 @@ Command add_verify(CLI::App& app) {
       "  quadruped3d verify out\n"
       "  quadruped3d verify out/quadruped3d-0123456789ab --json\n"
       "Exit code 0 means that the dataset is sound. Exit code 1 means that something is wrong; every\n"
-      "problem is listed.");
+      "problem is listed. Remove a damaged file of the dataset and run the `build` that made it again: it "
+      "is\n"
+      "made again, to the same bytes.");
   return [arguments] {
     const dataset::VerifySummary summary = dataset::verify(arguments->dataset, arguments->quiet);
     for (const std::string& problem : summary.problems) fmt::print(stderr, "problem: {}\n", problem);

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "manifests/atomic_file.h"
+#include "manifests/file_descriptor.h"
 #include "pipeline/config/json_fields.h"
 #include "pipeline/run/errors.h"
 
@@ -29,7 +30,8 @@ json read_json(const fs::path& file) {
     return json::parse(manifests::read_file(file), check_depth, true, /*ignore_comments=*/true);
   } catch (const json::exception& error) {  // also numbers beyond double, which are no parse_error
     throw run::ConfigError(fmt::format("{}: not valid JSON: {}", file.string(), error.what()));
-  } catch (const std::runtime_error& error) {
+  } catch (const manifests::IoError& error) {
+    if (!error.names_no_file()) throw;
     throw run::ConfigError(error.what());
   }
 }

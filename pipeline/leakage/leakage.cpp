@@ -66,11 +66,7 @@ Pictures read_test_sets(const config::LeakageConfig& config, manifests::DigestCa
     std::vector<std::string> shas(dataset.records.size());
     tbb::parallel_for(std::size_t{0}, shas.size(), [&](std::size_t i) {
       if (dataset.records[i].image_path.empty() || run::interrupted()) return;
-      try {
-        shas[i] = digests.digest(dataset.records[i].image_path);
-      } catch (const std::runtime_error&) {
-        shas[i].clear();  // told below
-      }
+      shas[i] = digests.digest_if_present(dataset.records[i].image_path).value_or("");  // absence: told below
     });
     run::throw_if_interrupted();
     for (std::size_t i = 0; i < shas.size(); ++i) {

@@ -43,6 +43,10 @@ bool parse_hash(std::string_view digits, std::uint64_t& hash) {
 
 std::optional<PictureHash> hash_file(const std::string& path) {
   const loaders::pictures::DecodedImage image = loaders::pictures::decode_image(std::filesystem::path(path));
+  if (image.failure == manifests::Reason::image_missing) {  // it was there when it was digested
+    throw std::runtime_error(
+        fmt::format("{}: it could be read before and cannot now; put it back and run again", image.detail));
+  }
   if (image.failure != manifests::Reason::none) return std::nullopt;
   return loaders::pictures::perceptual_hash(image.rgb);
 }

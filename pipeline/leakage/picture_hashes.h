@@ -24,7 +24,8 @@ class PictureHashes {
   explicit PictureHashes(std::filesystem::path file);
 
   // Hashes, in parallel, those that are not known yet, and appends them to the file. A picture that cannot be
-  // decoded, or is one colour, has no hash. Throws std::runtime_error, Interrupted.
+  // decoded, or is one colour, has no hash. Throws std::runtime_error for one that is gone,
+  // manifests::IoError for one that cannot be read, Interrupted.
   void add(const std::vector<PictureFile>& pictures, bool quiet);
 
   std::optional<manifests::PictureHash> find(const std::string& sha256) const;

@@ -2,6 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <system_error>
+#include <utility>
+
+#include "manifests/digest.h"
+#include "manifests/file_descriptor.h"
+#include "pipeline/run/log.h"
 #include "pipeline/stages/stages.h"
 
 namespace q3d::pipeline::stages {
@@ -22,27 +28,77 @@ std::filesystem::path unit_file(const std::filesystem::path& folder, std::int64_
 
 StageStore::StageStore(const std::filesystem::path& out, const std::string& stage, const std::string& key,
                        std::string candidates::Unit::*digest)
-    : folder_(opened(out, stage, key)), digest_(digest), journal_(folder_ / "journal.jsonl") {}
+    : folder_(opened(out, stage, key)), digest_(digest), journal_(folder_ / "journal.jsonl") {
+  for (const std::int64_t line : journal_.damaged_lines()) {
+    run::log_warning(fmt::format(
+        "{}, line {}: damaged (its checksum or its fields do not match); the unit it stood for is made again",
+        (folder_ / "journal.jsonl").string(), line));
+  }
+}
 
 std::filesystem::path StageStore::file(const candidates::Unit& unit) const {
   return unit_file(folder_, unit.index);
 }
 
-std::optional<manifests::JournalEntry> StageStore::entry(const candidates::Unit& unit) const {
+// What the journal says of the unit, if its file is there with the right size.
+std::optional<manifests::JournalEntry> StageStore::claimed(const candidates::Unit& unit) {
+  std::optional<manifests::JournalEntry> entry;
+  {
+    const std::lock_guard lock(mutex_);
+    entry = journal_.find(unit.index, unit.*digest_);
+  }
+  if (!entry) return std::nullopt;
+  std::error_code error;
+  const std::uintmax_t bytes = std::filesystem::file_size(file(unit), error);
+  if (error && !manifests::names_no_file(error.value())) {
+    throw manifests::IoError("inspect", file(unit), error.value());
+  }
+  if (!error && bytes == static_cast<std::uintmax_t>(entry->bytes)) return entry;
+  give_up(unit, error ? fmt::format("it is gone ({})", error.message())
+                      : fmt::format("got {} bytes, expected {}", bytes, entry->bytes));
+  return std::nullopt;
+}
+
+std::optional<manifests::JournalEntry> StageStore::entry(const candidates::Unit& unit) {
+  auto entry = claimed(unit);
+  if (!entry) return std::nullopt;
+  {
+    const std::lock_guard lock(mutex_);
+    if (compared_.contains(unit.index)) return entry;
+  }
+  if (!accept(unit, entry->sha256, manifests::sha256_file(file(unit)))) return std::nullopt;
+  return entry;
+}
+
+std::optional<manifests::Table> StageStore::load(const candidates::Unit& unit) {
+  const auto entry = claimed(unit);
+  if (!entry) return std::nullopt;
+  std::vector<std::byte> bytes = manifests::read_bytes(file(unit));
+  if (!accept(unit, entry->sha256, manifests::sha256(bytes))) return std::nullopt;
+  return manifests::read_table(file(unit), std::move(bytes));
+}
+
+bool StageStore::accept(const candidates::Unit& unit, const std::string& expected, const std::string& got) {
+  if (got != expected) {
+    give_up(unit, fmt::format("got SHA-256 {}, expected {}", got, expected));
+    return false;
+  }
   const std::lock_guard lock(mutex_);
-  return journal_.find(unit.index, unit.*digest_);
+  compared_.insert(unit.index);
+  return true;
 }
 
-bool StageStore::has(const candidates::Unit& unit) const {
-  return entry(unit).has_value();
+void StageStore::give_up(const candidates::Unit& unit, const std::string& why) {
+  {
+    const std::lock_guard lock(mutex_);
+    journal_.forget(unit.index);
+    compared_.erase(unit.index);
+  }
+  run::log_warning(
+      fmt::format("{}: damaged: {}; unit {} is made again", file(unit).string(), why, unit.index));
 }
 
-std::optional<manifests::Table> StageStore::load(const candidates::Unit& unit) const {
-  if (!has(unit)) return std::nullopt;
-  return manifests::read_table(file(unit));
-}
-
-std::optional<manifests::Table> StageStore::load_newest(std::int64_t unit) const {
+std::optional<manifests::Table> StageStore::load_newest(std::int64_t unit) {
   candidates::Unit newest;
   newest.index = unit;
   {
@@ -70,6 +126,7 @@ void StageStore::save(const candidates::Unit& unit, std::int64_t rows,
   entry.rows = rows;
   const std::lock_guard lock(mutex_);
   journal_.append(entry);
+  compared_.insert(unit.index);
 }
 
 }  // namespace q3d::pipeline::stages

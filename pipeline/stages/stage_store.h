@@ -1,10 +1,12 @@
 // One stage's folder: unit files and the journal that says which of them exist.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 
 #include "manifests/journal.h"
@@ -16,32 +18,43 @@ namespace q3d::pipeline::stages {
 // A unit's file in a stage's folder.
 std::filesystem::path unit_file(const std::filesystem::path& folder, std::int64_t unit);
 
-// Thread-safe: one thread may save units while another asks for them.
+// A file of an earlier run is used only after its bytes were compared with the SHA-256 that the journal
+// holds. A unit whose file is gone or damaged counts as not finished, and a warning names it. Thread-safe:
+// one thread may save units while others ask for them.
 class StageStore {
  public:
-  // Opens or makes <out>/stages/<stage>-<key>/. `digest` is what of a unit its file depends on.
+  // Opens or makes <out>/stages/<stage>-<key>/. `digest` is what of a unit its file depends on. Throws as
+  // open_stage_folder, and manifests::IoError.
   StageStore(const std::filesystem::path& out, const std::string& stage, const std::string& key,
              std::string candidates::Unit::*digest = &candidates::Unit::input_digest);
 
-  bool has(const candidates::Unit& unit) const;
-  std::optional<manifests::Table> load(
-      const candidates::Unit& unit) const;  // throws std::runtime_error on a damaged file
+  // Whether the unit is finished. The first call of a run reads the unit's file whole. Throws
+  // manifests::IoError when a file that is there cannot be read; so do the next two.
+  bool has(const candidates::Unit& unit) { return entry(unit).has_value(); }
+  std::optional<manifests::JournalEntry> entry(const candidates::Unit& unit);
+  // The table of a finished unit, parsed from the very bytes that were compared.
+  std::optional<manifests::Table> load(const candidates::Unit& unit);
+
   // The newest table of a unit, whatever its input was, for readers that do not know the candidates. The
   // caller must check that the table is of the candidates that it expects.
-  std::optional<manifests::Table> load_newest(std::int64_t unit) const;
+  std::optional<manifests::Table> load_newest(std::int64_t unit);
   void save(const candidates::Unit& unit, const manifests::Table& table);
   // Records a file that `write` makes under the given path and whose SHA-256 it returns.
   void save(const candidates::Unit& unit, std::int64_t rows,
             const std::function<std::string(const std::filesystem::path&)>& write);
 
   std::filesystem::path file(const candidates::Unit& unit) const;
-  std::optional<manifests::JournalEntry> entry(const candidates::Unit& unit) const;
 
  private:
+  std::optional<manifests::JournalEntry> claimed(const candidates::Unit& unit);
+  bool accept(const candidates::Unit& unit, const std::string& expected, const std::string& got);
+  void give_up(const candidates::Unit& unit, const std::string& why);
+
   std::filesystem::path folder_;
   std::string candidates::Unit::*digest_;
-  mutable std::mutex mutex_;  // guards journal_
+  std::mutex mutex_;  // guards what follows
   manifests::Journal journal_;
+  std::set<std::int64_t> compared_;  // units whose file this run has compared or written
 };
 
 }  // namespace q3d::pipeline::stages

@@ -5,7 +5,9 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
+#include <optional>
 #include <stdexcept>
+#include <utility>
 
 #include "manifests/atomic_file.h"
 #include "manifests/shard.h"
@@ -95,6 +97,20 @@ json bounds_json(const filters::GuardBounds& bounds) {
           {"mask_iou_min", bounds.mask_iou_min}};
 }
 
+std::string folder_name(const std::string& stage, const std::string& key) {
+  return stage + "-" + key.substr(0, kShortKey);
+}
+
+// The key that a stage's manifest.json holds; nothing when the text is damaged so that it holds none.
+std::optional<std::string> key_in(const std::string& text) {
+  const json manifest = json::parse(text, nullptr, false);
+  const auto found = manifest.is_object() ? manifest.find("key") : manifest.end();
+  if (found == manifest.end() || !found->is_string()) return std::nullopt;
+  std::string key = found->get<std::string>();
+  const bool is_key = key.size() == 64 && key.find_first_not_of("0123456789abcdef") == std::string::npos;
+  return is_key ? std::optional(std::move(key)) : std::nullopt;
+}
+
 }  // namespace
 
 AssetDigests digest_assets(const config::BuildConfig& config, manifests::DigestCache& digests) {
@@ -163,7 +179,7 @@ StageKeys stage_keys(const config::BuildConfig& config, const config::JudgingRul
 
 std::filesystem::path stage_folder(const std::filesystem::path& out, const std::string& stage,
                                    const std::string& key) {
-  return out / "stages" / (stage + "-" + key.substr(0, kShortKey));
+  return out / "stages" / folder_name(stage, key);
 }
 
 void open_stage_folder(const std::filesystem::path& folder, const std::string& stage,
@@ -172,12 +188,15 @@ void open_stage_folder(const std::filesystem::path& folder, const std::string& s
   manifests::remove_temporaries(folder);
   const std::filesystem::path manifest = folder / "manifest.json";
   if (std::filesystem::exists(manifest)) {
-    const json found = json::parse(manifests::read_file(manifest), nullptr, false);
-    if (found.is_object() && found.value("key", "") == key) return;
-    throw std::runtime_error(
-        fmt::format("{}: expected the {} stage with key {}, found {}; remove the folder to "
-                    "make it anew",
-                    manifest.string(), stage, key, found.is_object() ? found.dump() : "no JSON"));
+    const std::optional<std::string> found = key_in(manifests::read_file(manifest));
+    if (found == key) return;
+    if (found || folder.filename() != folder_name(stage, key)) {
+      throw std::runtime_error(
+          fmt::format("{}: expected the {} stage with key {}, found {}; remove the folder to make it anew",
+                      manifest.string(), stage, key, found ? "key " + *found : "no readable key"));
+    }
+    run::log_warning(fmt::format("{}: damaged: got no readable key, expected {}; it is written anew",
+                                 manifest.string(), key));
   }
   manifests::write_file_atomically(manifest, json{{"stage", stage}, {"key", key}}.dump(2) + "\n");
 }

@@ -56,8 +56,9 @@ StageKeys stage_keys(const config::BuildConfig& config, const config::JudgingRul
 // <out>/stages/<stage>-<first 12 of key>.
 std::filesystem::path stage_folder(const std::filesystem::path& out, const std::string& stage,
                                    const std::string& key);
-// Makes the folder, removes torn temporaries and writes manifest.json (stage, key, what went into it).
-// Throws std::runtime_error when the folder belongs to another key.
+// Makes the folder, removes torn temporaries and writes manifest.json (stage and key). A manifest.json
+// without a readable key is damaged: it is written anew if the folder has the name that stage_folder gives,
+// and a warning says so. Throws std::runtime_error when the folder belongs to another key.
 void open_stage_folder(const std::filesystem::path& folder, const std::string& stage, const std::string& key);
 
 }  // namespace q3d::pipeline::stages

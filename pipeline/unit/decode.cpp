@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
+#include <stdexcept>
+
 #include "loaders/pictures/box.h"
 #include "loaders/pictures/crop.h"
 #include "loaders/pictures/image.h"
@@ -17,6 +19,14 @@ using manifests::Reason;
 // As in the official evaluator, the area is the sum of the warped mask / 255.
 double area_px(const cv::Mat& mask) {
   return cv::sum(mask)[0] / 255.0;
+}
+
+// A picture that had a digest and is gone now (an unmounted disk) is no failed sample: it stops the run.
+void require_present(const candidates::Candidate& candidate, const DecodedSample& decoded) {
+  if (decoded.failure != Reason::image_missing || candidate.image_sha256.empty()) return;
+  throw std::runtime_error(
+      fmt::format("{}: the picture {} could be read before and cannot now ({}); put it back and build again",
+                  candidate.record.id, candidate.record.image_path, decoded.detail));
 }
 
 }  // namespace
@@ -82,6 +92,7 @@ void decode_unit(UnitWork& work, const config::ShardConfig& shards, const config
     if (run::interrupted()) return;
     if (const auto want = wanted(picture_facts(work, i, rules))) {
       work.decoded[i] = decode_sample(work.candidates[i].record, *want, shards);
+      require_present(work.candidates[i], work.decoded[i]);
     }
   });
 }

@@ -9,7 +9,8 @@
 
 namespace q3d::pipeline::unit {
 
-// Decodes, checks and crops one candidate's picture. A bad picture is a failure in the result.
+// Decodes, checks and crops one candidate's picture. A bad picture is a failure in the result. Throws
+// manifests::IoError if a picture or mask is there and cannot be read.
 DecodedSample decode_sample(const manifests::SampleRecord& record, Wanted want,
                             const config::ShardConfig& shards);
 
@@ -19,7 +20,8 @@ double mask_area_px(const std::string& mask_path, const manifests::Box& box, int
                     int image_height_px);
 
 // Fills work.decoded, in parallel, with what the steps to come need of each picture (picture_needs.h).
-// `rules` may be null when only predictions are wanted; then no stored crops are made.
+// `rules` may be null when only predictions are wanted; then no stored crops are made. Throws as
+// decode_sample does, and std::runtime_error if a picture is gone that was there when it was digested.
 void decode_unit(UnitWork& work, const config::ShardConfig& shards, const config::JudgingRules* rules);
 
 // Frees the pixels of stored crops that will not be encoded: those of candidates that a verdict has dropped.

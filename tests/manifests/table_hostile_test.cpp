@@ -9,6 +9,7 @@
 #include <random>
 
 #include "manifests/atomic_file.h"
+#include "manifests/file_descriptor.h"
 #include "manifests/table.h"
 #include "manifests/table_reader.h"
 #include "tests/support/paths.h"
@@ -52,6 +53,9 @@ class HostileTable : public ::testing::Test {
   void expect_refused(const std::string& why) {
     EXPECT_THAT([&] { read_table(path_); },
                 ThrowsMessage<std::runtime_error>(AllOf(HasSubstr(path_.string()), HasSubstr(why))));
+    EXPECT_THAT([&] { read_table(path_, read_bytes(path_)); },
+                ThrowsMessage<std::runtime_error>(AllOf(HasSubstr(path_.string()), HasSubstr(why))))
+        << "from memory";
   }
   static void add_rows(hid_t file, std::int64_t rows) {
     const hid_t space = H5Screate(H5S_SCALAR);

@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "manifests/digest.h"
+#include "manifests/file_descriptor.h"
 #include "manifests/table_reader.h"
 #include "tests/manifests/full_disk.h"
 #include "tests/support/paths.h"
@@ -63,6 +64,7 @@ TEST(Table, ReadsBackWhatWasWritten) {
   const std::string digest = write_table(path, make_table());
   EXPECT_EQ(digest, sha256_file(path));
   expect_equal(read_table(path), make_table());
+  expect_equal(read_table("a name for messages", read_bytes(path)), make_table());
 }
 
 TEST(Table, BytesThatLieElsewhereMakeTheSameFile) {

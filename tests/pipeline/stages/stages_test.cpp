@@ -1,15 +1,19 @@
 #include "pipeline/stages/stages.h"
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include <fstream>
 #include <functional>
 #include <vector>
 
+#include "manifests/atomic_file.h"
 #include "tests/support/paths.h"
 
 namespace q3d::pipeline::stages {
 namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
 
 struct Inputs {
   config::BuildConfig config;
@@ -194,21 +198,60 @@ TEST(StageKeys, ThresholdsOfADatasetCount) {
   EXPECT_EQ(common.keys().predict, own.keys().predict);
 }
 
-TEST(StageFolder, RefusesAFolderOfAnotherKey) {
-  const testing::ScratchDir scratch;
-  const auto folder = stage_folder(scratch.path(), "predict", std::string(64, 'a'));
-  open_stage_folder(folder, "predict", std::string(64, 'a'));
-  open_stage_folder(folder, "predict", std::string(64, 'a'));
-  EXPECT_THROW(open_stage_folder(folder, "predict", std::string(64, 'b')), std::runtime_error);
+class StageFolder : public ::testing::Test {
+ protected:
+  void open(const std::string& key) {
+    open_stage_folder(folder_, "predict", key, [this](const std::string& line) { told_.push_back(line); });
+  }
+  void write_manifest(const std::string& text) { std::ofstream(folder_ / "manifest.json") << text; }
+
+  testing::ScratchDir scratch_;
+  const std::string key_ = std::string(64, 'a');
+  std::filesystem::path folder_ = stage_folder(scratch_.path(), "predict", key_);
+  std::vector<std::string> told_;
+};
+
+TEST_F(StageFolder, RefusesAFolderOfAnotherKey) {
+  open(key_);
+  open(key_);
+  EXPECT_THROW(open(std::string(64, 'b')), std::runtime_error);
+  EXPECT_TRUE(told_.empty());
+  write_manifest("{\"stage\": \"predict\", \"key\": \"" + std::string(63, 'a') + "b\"}");
+  EXPECT_THROW(open(key_), std::runtime_error) << "the same first 12 digits, but another key";
 }
 
-TEST(StageFolder, RemovesTornTemporaries) {
-  const testing::ScratchDir scratch;
-  const auto folder = stage_folder(scratch.path(), "predict", std::string(64, 'a'));
-  open_stage_folder(folder, "predict", std::string(64, 'a'));
-  std::ofstream(folder / "unit-000000.h5.tmp") << "half";
-  open_stage_folder(folder, "predict", std::string(64, 'a'));
-  EXPECT_FALSE(std::filesystem::exists(folder / "unit-000000.h5.tmp"));
+TEST_F(StageFolder, WritesADamagedManifestAnew) {
+  open(key_);
+  const std::string sound = manifests::read_file(folder_ / "manifest.json");
+  const std::vector<std::string> damaged = {"",
+                                            sound.substr(0, sound.size() / 2),
+                                            "[]",
+                                            "{}",
+                                            "{\"key\": 5}",
+                                            "{\"key\": \"" + std::string(64, 'q') + "\"}"};
+  for (const std::string& text : damaged) {
+    told_.clear();
+    write_manifest(text);
+    open(key_);
+    EXPECT_EQ(manifests::read_file(folder_ / "manifest.json"), sound) << text;
+    ASSERT_EQ(told_.size(), 1U) << text;
+    EXPECT_THAT(told_[0], AllOf(HasSubstr((folder_ / "manifest.json").string()), HasSubstr("damaged"),
+                                HasSubstr(key_)));
+  }
+}
+
+TEST_F(StageFolder, RefusesADamagedManifestInAFolderOfAnotherName) {
+  folder_ = scratch_.path() / "stages" / "predict-of-someone";
+  open(key_);
+  write_manifest("{");
+  EXPECT_THROW(open(key_), std::runtime_error);
+}
+
+TEST_F(StageFolder, RemovesTornTemporaries) {
+  open(key_);
+  std::ofstream(folder_ / "unit-000000.h5.tmp") << "half";
+  open(key_);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "unit-000000.h5.tmp"));
 }
 
 }  // namespace
