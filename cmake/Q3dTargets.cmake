@@ -83,18 +83,37 @@ function(q3d_room)
   file(APPEND "${PROJECT_BINARY_DIR}/rooms.tsv" "${folder}\t${rooms}\t${ARG_TORCH}\t${ARG_JOB}\n")
 endfunction()
 
-# q3d_test(NAME SOURCES ... LIBS ... [LABEL label] [TORCH]): one GoogleTest binary, one ctest entry a test case.
+# q3d_test(NAME SOURCES ... LIBS ... [LABEL label] [TORCH]): one GoogleTest binary. Each of its test cases is a ctest
+# entry, NAME.Suite.Case. A binary that loads LibTorch takes half a second to start, so with TORCH each suite is an
+# entry instead, NAME.Suite.
+include(GoogleTest)
 function(q3d_test name)
   cmake_parse_arguments(ARG "TORCH" "LABEL" "SOURCES;LIBS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE q3d_options q3d_test_support ${ARG_LIBS} GTest::gtest_main)
   q3d_precompiled(${name} "${ARG_TORCH}")
-  if(ARG_TORCH)
-    target_link_libraries(${name} PRIVATE LibTorch::LibTorch)
-  endif()
   if(NOT ARG_LABEL)
     set(ARG_LABEL unit)
   endif()
-  add_test(NAME ${name} COMMAND ${name})
-  set_tests_properties(${name} PROPERTIES LABELS "${ARG_LABEL}" TIMEOUT 600)
+  if(ARG_TORCH)
+    target_link_libraries(${name} PRIVATE LibTorch::LibTorch)
+    q3d_discover_suites(${name} ${ARG_LABEL} 600)
+  else()
+    gtest_discover_tests(${name} TEST_PREFIX "${name}." DISCOVERY_TIMEOUT 120
+                         PROPERTIES LABELS ${ARG_LABEL} TIMEOUT 600)
+  endif()
+endfunction()
+
+# q3d_discover_suites(NAME LABEL TIMEOUT): does for suites what gtest_discover_tests does for cases. The binary is asked
+# for its suites after it is linked, and ctest reads what was found.
+function(q3d_discover_suites name label timeout)
+  set(found "${CMAKE_CURRENT_BINARY_DIR}/${name}_suites.cmake")
+  add_custom_command(TARGET ${name} POST_BUILD BYPRODUCTS "${found}"
+    COMMAND ${CMAKE_COMMAND} -D "EXECUTABLE=$<TARGET_FILE:${name}>" -D NAME=${name} -D LABEL=${label}
+            -D TIMEOUT=${timeout} -D "OUTPUT=${found}" -P "${PROJECT_SOURCE_DIR}/cmake/Q3dDiscoverSuites.cmake"
+    VERBATIM)
+  set(included "${CMAKE_CURRENT_BINARY_DIR}/${name}_include.cmake")
+  file(WRITE "${included}" "if(EXISTS \"${found}\")\n  include(\"${found}\")\nelse()\n"
+                           "  add_test(${name}_NOT_BUILT ${name}_NOT_BUILT)\nendif()\n")
+  set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES "${included}")
 endfunction()

@@ -22,7 +22,8 @@ const TokenGrid& grid_of(bool true_token_grid) {
 
 // Sine and cosine of one axis: position (N) in [0, 1) -> (N, half).
 torch::Tensor encode_axis(const torch::Tensor& position, std::int64_t half) {
-  const torch::Tensor exponent = torch::arange(half, torch::kFloat32) * 2.0 / static_cast<double>(2 * half);
+  const torch::Tensor exponent =
+      torch::arange(half, position.options()) * 2.0 / static_cast<double>(2 * half);
   const torch::Tensor angle = position.unsqueeze(1) / torch::pow(10000.0, exponent);
   const torch::Tensor even = angle.slice(1, 0, half, 2).sin();
   const torch::Tensor odd = angle.slice(1, 1, half, 2).cos();
@@ -30,10 +31,10 @@ torch::Tensor encode_axis(const torch::Tensor& position, std::int64_t half) {
 }
 
 // (192, width) = [y | x]. Official code: PositionalEncoding2D.
-torch::Tensor position_encoding(std::int64_t width, const TokenGrid& grid) {
+torch::Tensor position_encoding(std::int64_t width, const TokenGrid& grid, torch::ScalarType dtype) {
   const torch::Tensor index = torch::arange(grid.rows * grid.columns);
-  const torch::Tensor y = torch::floor_divide(index, grid.columns).to(torch::kFloat32) / grid.rows;
-  const torch::Tensor x = torch::remainder(index, grid.columns).to(torch::kFloat32) / grid.columns;
+  const torch::Tensor y = torch::floor_divide(index, grid.columns).to(dtype) / grid.rows;
+  const torch::Tensor x = torch::remainder(index, grid.columns).to(dtype) / grid.columns;
   return torch::cat({encode_axis(y, width / 2), encode_axis(x, width / 2)}, 1);
 }
 
@@ -148,7 +149,8 @@ Decoder::Decoder(const PrimaConfig& config, const Placement& placement)
   if (config.embed_dim != width) {
     image_proj_ = register_module("image_proj", std::make_shared<Linear>(config.embed_dim, width, placement));
   }
-  position_ = position_encoding(width, grid_of(true_token_grid_)).to(placement.vector());
+  position_ =
+      position_encoding(width, grid_of(true_token_grid_), placement.vector_dtype()).to(placement.vector());
   const auto layers = register_module("layers", std::make_shared<torch::nn::Module>());
   for (std::int64_t i = 0; i < config.dec_layers; ++i) {
     layers_.push_back(

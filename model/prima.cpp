@@ -16,12 +16,12 @@ namespace {
 
 constexpr std::int64_t kCropSidePx = 256;
 
-// Of ImageNet, on the scale 0..255.
-torch::Tensor per_channel(double red, double green, double blue, torch::Device device) {
+// Of ImageNet, on the scale 0..255: float32 constants in the official code, whatever the network's dtype.
+torch::Tensor per_channel(double red, double green, double blue, torch::TensorOptions options) {
   return torch::tensor({static_cast<float>(255.0 * red), static_cast<float>(255.0 * green),
                         static_cast<float>(255.0 * blue)})
       .view({1, 3, 1, 1})
-      .to(device);
+      .to(options);
 }
 
 void require_crops(const char* name, const torch::Tensor& crops, torch::ScalarType dtype) {
@@ -42,31 +42,39 @@ Prima::Prima(std::shared_ptr<PrimaNet> net, smal::tensors::SmalBody body)
     throw std::invalid_argument(
         fmt::format("the network is on {}, the body on {}", net_device.str(), body_.device().str()));
   }
+  const torch::ScalarType net_dtype = net_->placement().vector_dtype();
+  const torch::ScalarType body_dtype = body_.asset().v_template.scalar_type();
+  if (net_dtype != body_dtype) {
+    throw std::invalid_argument(fmt::format("the network computes in {}, the body in {}; expected the same",
+                                            torch::toString(net_dtype), torch::toString(body_dtype)));
+  }
 }
 
 Prima Prima::load(const std::filesystem::path& checkpoint, const std::filesystem::path& smal_asset,
                   torch::Device device, torch::ScalarType dtype) {
-  if (dtype != torch::kFloat32 && dtype != torch::kBFloat16) {
+  if (dtype != torch::kFloat32 && dtype != torch::kBFloat16 && dtype != torch::kFloat64) {
     throw std::invalid_argument(
-        fmt::format("network dtype {} is not float32 or bfloat16", torch::toString(dtype)));
+        fmt::format("network dtype {} is not float32, bfloat16 or float64", torch::toString(dtype)));
   }
   const smal::tensors::SmalAsset asset = smal::tensors::load_asset(smal_asset);
   const smal::tensors::SafeTensors file = smal::tensors::SafeTensors::open(checkpoint);
   auto net = load_net(file, checkpoint_config(file), asset, {device, dtype});
   net->eval();
   for (auto& parameter : net->parameters()) parameter.set_requires_grad(false);
-  return {std::move(net), smal::tensors::SmalBody(asset, device)};
+  const torch::ScalarType body_dtype = net->placement().vector_dtype();
+  return {std::move(net), smal::tensors::SmalBody(asset, device).to_dtype(body_dtype)};
 }
 
 torch::Tensor Prima::normalise(const torch::Tensor& crops_u8) const {
   require_crops("crops_u8", crops_u8, torch::kUInt8);
-  const torch::Tensor mean = per_channel(0.485, 0.456, 0.406, device());
-  const torch::Tensor deviation = per_channel(0.229, 0.224, 0.225, device());
-  return (crops_u8.to(device()).to(torch::kFloat32) - mean) / deviation;
+  const torch::TensorOptions options = net_->placement().vector();
+  const torch::Tensor mean = per_channel(0.485, 0.456, 0.406, options);
+  const torch::Tensor deviation = per_channel(0.229, 0.224, 0.225, options);
+  return (crops_u8.to(options) - mean) / deviation;
 }
 
 ImageFeatures Prima::encode(const torch::Tensor& images) const {
-  require_crops("images", images, torch::kFloat32);
+  require_crops("images", images, net_->placement().vector_dtype());
   const torch::NoGradGuard no_grad;
   return net_->encode(images);
 }

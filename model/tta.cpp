@@ -45,20 +45,20 @@ torch::Tensor objective(const TtaOptions& options, const torch::Tensor& projecte
 }
 
 KeypointTargets make_targets(const torch::Tensor& keypoints, const std::vector<TtaSchedule>& schedules,
-                             torch::Device device) {
-  torch::Tensor held_out = torch::zeros({keypoints.size(0), kKeypoints, 1}, torch::kFloat32);
+                             torch::TensorOptions options) {
+  torch::Tensor held_out = torch::zeros({keypoints.size(0), kKeypoints, 1}, options.device(torch::kCPU));
   for (std::size_t i = 0; i < schedules.size(); ++i) {
     for (std::size_t k = 0; k < schedules[i].held_out.size(); ++k) {
       if (!schedules[i].held_out[k]) continue;
       held_out[static_cast<std::int64_t>(i)][static_cast<std::int64_t>(k)].fill_(1.0);
     }
   }
-  const torch::Tensor numbers = keypoints.to(device).to(torch::kFloat32);
+  const torch::Tensor numbers = keypoints.to(options);
   const torch::Tensor visible = numbers.narrow(2, 2, 1) > 0.0;
   KeypointTargets targets;
   targets.xy = torch::where(visible, numbers.narrow(2, 0, 2), torch::zeros({}, numbers.options()));
-  targets.visible = visible.to(torch::kFloat32);
-  targets.held_out = held_out.to(device) * targets.visible;
+  targets.visible = visible.to(options);
+  targets.held_out = held_out.to(options) * targets.visible;
   targets.fitted = targets.visible - targets.held_out;
   return targets;
 }
@@ -146,7 +146,7 @@ class Adaptation {
                                [](const TtaSchedule& schedule) { return schedule.held_out.any(); })),
         initial_betas_(decoder().initial_betas(features.bio_token)),
         slots_(decoder().own_parameters(), decoder().remember(features.image_tokens), initial_betas_.clone(),
-               make_targets(keypoints, schedules, prima.device())) {
+               make_targets(keypoints, schedules, initial_betas_.options())) {
     result_.l_proj.resize(schedules.size());
     result_.held_out.resize(schedules.size());
     result_.loss.resize(schedules.size());
@@ -226,9 +226,10 @@ class Adaptation {
 
   // Notes the iterate in the results -> per slot, whether the instance goes on.
   std::vector<bool> record(const Iterate& iterate) {
-    const torch::Tensor numbers = torch::stack({iterate.loss.detach(), iterate.l_proj,
-                                                iterate.usable.to(torch::kFloat32), iterate.held_out})
-                                      .to(torch::kCPU, torch::kFloat64);
+    const torch::Tensor numbers =
+        torch::stack({iterate.loss.detach(), iterate.l_proj, iterate.usable.to(iterate.l_proj.scalar_type()),
+                      iterate.held_out})
+            .to(torch::kCPU, torch::kFloat64);
     const auto rows = numbers.accessor<double, 2>();
     std::vector<std::int64_t> accepted, improved;
     std::vector<bool> goes_on(static_cast<std::size_t>(slots_.size()), false);

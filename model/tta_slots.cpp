@@ -46,7 +46,7 @@ TtaSlots::TtaSlots(const AdaptedParameters& initial, DecoderMemory memory, torch
     parameters_.push_back(shared.detach().unsqueeze(0).repeat(repeats));
     first_moments_.push_back(torch::zeros_like(parameters_.back()));
     second_moments_.push_back(torch::zeros_like(parameters_.back()));
-    step_counts_.push_back(torch::zeros({}, shared.options().requires_grad(false)));
+    step_counts_.push_back(torch::zeros({}, shared.options().dtype(torch::kFloat32).requires_grad(false)));
   }
 }
 

@@ -12,6 +12,24 @@
 #include "tests/support/paths.h"
 
 namespace q3d::testing {
+namespace {
+
+void move_weights(const model::Prima& prima, std::uint64_t seed) {
+  const torch::NoGradGuard no_grad;
+  auto generator = torch::make_generator<torch::CPUGeneratorImpl>(seed);
+  for (auto& weight : prima.net().parameters()) {
+    const torch::Tensor part = torch::rand(weight.sizes(), generator, torch::kFloat64) * 2.0 - 1.0;
+    weight.mul_(1.0 + kFloat32Rounding * part);
+  }
+}
+
+torch::Tensor largest_change(const torch::Tensor& tensor, const torch::Tensor& exact) {
+  const torch::Tensor change = (tensor - exact).detach().abs();
+  const bool are_rotations = change.dim() >= 3 && change.size(-1) == 3 && change.size(-2) == 3;
+  return are_rotations ? change.amax({-2, -1}, /*keepdim=*/true) : change.max();
+}
+
+}  // namespace
 
 smal::tensors::SafeTensors parity_file(const std::string& name) {
   return smal::tensors::SafeTensors::open(parity_dir() / (name + ".safetensors"));
@@ -44,8 +62,8 @@ model::PrimaConfig parity_config(const std::string& which) {
   return config;
 }
 
-model::Prima parity_prima(const std::string& which) {
-  return parity_prima(which, parity_config(which));
+model::Prima parity_prima(const std::string& which, torch::ScalarType dtype) {
+  return parity_prima(which, parity_config(which), dtype);
 }
 
 model::Prima parity_prima(const std::string& which, const model::PrimaConfig& config,
@@ -63,14 +81,44 @@ torch::Tensor parity_images(const model::Prima& prima, const torch::Tensor& inde
   return prima.normalise(crops.index_select(0, index.to(torch::kInt64)));
 }
 
+TensorMap float32_noise(const std::string& which, const model::PrimaConfig& config,
+                        const std::function<TensorMap(const model::Prima&)>& compute) {
+  constexpr std::uint64_t kRuns = 4;
+  const TensorMap exact = compute(parity_prima(which, config, torch::kFloat64));
+  TensorMap noise;
+  for (std::uint64_t seed = 1; seed <= kRuns; ++seed) {
+    const model::Prima moved = parity_prima(which, config, torch::kFloat64);
+    move_weights(moved, seed);
+    for (const auto& [name, tensor] : compute(moved)) {
+      const torch::Tensor change = largest_change(tensor, exact.at(name));
+      const auto known = noise.find(name);
+      noise[name] = known == noise.end() ? change : torch::maximum(known->second, change);
+    }
+  }
+  return noise;
+}
+
+torch::Tensor few_roundings(const torch::Tensor& tensor) {
+  return 4.0 * kFloat32Rounding * tensor.to(torch::kFloat64).abs().max();
+}
+
 void expect_close(const std::string& name, const torch::Tensor& got, const torch::Tensor& expected,
                   double tolerance) {
+  expect_close(name, got, expected, torch::tensor(tolerance, torch::kFloat64));
+}
+
+void expect_close(const std::string& name, const torch::Tensor& got, const torch::Tensor& expected,
+                  const torch::Tensor& tolerance) {
   SCOPED_TRACE(name);
   ASSERT_TRUE(got.defined());
   ASSERT_EQ(got.sizes(), expected.sizes());
   ASSERT_TRUE(got.isfinite().all().item<bool>());
-  const double worst = (got.to(torch::kFloat64) - expected.to(torch::kFloat64)).abs().max().item<double>();
-  EXPECT_LE(worst, tolerance);
+  const torch::Tensor error = (got.to(torch::kFloat64) - expected.to(torch::kFloat64)).abs();
+  const torch::Tensor share = error / tolerance;
+  const std::int64_t worst = share.argmax().item<std::int64_t>();
+  EXPECT_LE(share.max().item<double>(), 1.0)
+      << "difference " << error.flatten()[worst].item<double>() << " at element " << worst << ", tolerance "
+      << tolerance.expand(error.sizes()).flatten()[worst].item<double>();
 }
 
 }  // namespace q3d::testing

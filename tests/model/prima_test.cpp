@@ -90,6 +90,36 @@ TEST_F(PrimaTest, VerticesAreAddedWithoutChangingTheRest) {
   EXPECT_TRUE(torch::equal(plain.keypoints_3d, full.keypoints_3d));
 }
 
+// The float32 network is near: rounding is some 1e-7 of numbers around 1, and a tiny network amplifies it by
+// less than a thousand.
+TEST_F(PrimaTest, Float64NetworksComputeEverythingInFloat64) {
+  const Prima exact = seeded(named_config("tiny"), torch::kFloat64);
+  const torch::Tensor images = exact.normalise(crops(2));
+  EXPECT_EQ(images.scalar_type(), torch::kFloat64);
+  const Prediction prediction = exact.predict(exact.encode(images), /*with_vertices=*/true);
+  const Prima single = seeded(named_config("tiny"));
+  const Prediction rounded =
+      single.predict(single.encode(single.normalise(crops(2))), /*with_vertices=*/true);
+  const auto expect_near = [](const torch::Tensor& got, const torch::Tensor& expected) {
+    EXPECT_EQ(got.scalar_type(), torch::kFloat64);
+    EXPECT_EQ(expected.scalar_type(), torch::kFloat32);
+    const double difference = (got - expected).abs().max().item<double>();
+    EXPECT_LT(difference, 1e-4);
+    EXPECT_GT(difference, 0.0);
+  };
+  expect_near(prediction.rotations, rounded.rotations);
+  expect_near(prediction.betas, rounded.betas);
+  expect_near(prediction.keypoints_2d, rounded.keypoints_2d);
+  expect_near(prediction.vertices, rounded.vertices);
+}
+
+TEST_F(PrimaTest, ABodyInAnotherDtypeIsRefused) {
+  const Prima single = seeded(named_config("tiny"));
+  const smal::tensors::SmalBody exact = single.body().to_dtype(torch::kFloat64);
+  auto net = std::make_shared<PrimaNet>(named_config("tiny"), Placement{});
+  EXPECT_THROW(Prima(net, exact), std::invalid_argument);
+}
+
 TEST_F(PrimaTest, NormaliseUsesImageNetStatistics) {
   const Prima prima = seeded(named_config("tiny"));
   const torch::Tensor white = torch::full({1, 3, 256, 256}, 255, torch::kUInt8);

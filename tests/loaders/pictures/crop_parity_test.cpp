@@ -93,6 +93,11 @@ void expect_near(const torch::Tensor& got, const torch::Tensor& expected, double
   EXPECT_LE(difference, tolerance) << name;
 }
 
+// A few float32 roundings of the tensor's largest number, which may be one of several in a sum.
+double few_roundings(const torch::Tensor& tensor) {
+  return 4.0 * 0x1p-24 * tensor.abs().max().item<double>();
+}
+
 class CropParity : public ::testing::Test {
  protected:
   void SetUp() override { ASSERT_FALSE(samples_.empty()); }
@@ -192,8 +197,9 @@ TEST_F(CropParity, augmented_patches_and_labels) {
 
     expect_equal(tensor_of(keypoints_to_crop(sample.keypoints, affine)).view({26, 3}),
                  augment_.tensor(name + "_keypoints_2d"), name + "_keypoints_2d");
-    expect_near(tensor_of(rotate_keypoints_3d(sample.keypoints_3d, drawn.rotation_deg)).view({26, 3}),
-                augment_.tensor(name + "_keypoints_3d").slice(1, 0, 3), 2e-7, name + "_keypoints_3d");
+    const torch::Tensor turned = augment_.tensor(name + "_keypoints_3d").slice(1, 0, 3);
+    expect_near(tensor_of(rotate_keypoints_3d(sample.keypoints_3d, drawn.rotation_deg)).view({26, 3}), turned,
+                few_roundings(turned), name + "_keypoints_3d");
     expect_near(tensor_of(rotate_global_orient(sample.global_orient, drawn.rotation_deg)),
                 augment_.tensor(name + "_global_orient"), 1e-6, name + "_global_orient");
   }
@@ -217,7 +223,8 @@ TEST_F(CropParity, demo_crops) {
         demo_crop(samples_[sample].rgb, {corner[0], corner[1], corner[2], corner[3]}, aspect);
     expect_equal(torch::tensor({crop.center_x_px, crop.center_y_px}), crops_.tensor(name + "_box_center"),
                  name);
-    expect_near(torch::tensor({crop.side_px}), crops_.tensor(name + "_box_size"), 1e-4, name);
+    const torch::Tensor side = crops_.tensor(name + "_box_size");
+    expect_near(torch::tensor({crop.side_px}), side, few_roundings(side), name);
     const torch::Tensor planes = torch::tensor(crop.planes).view({3, kPatchSidePx, kPatchSidePx});
     const std::int64_t step = crops_.contains(name + "_img_every4") ? 4 : 16;
     const std::string picture = name + "_img_every" + std::to_string(step);
