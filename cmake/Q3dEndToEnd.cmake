@@ -31,9 +31,10 @@ function(q3d_end_to_end_case name script case)
 endfunction()
 
 # One entry that runs tests/support/e2e with the folder of a class.
+# The limit only ends a program that hangs: on a busy machine an entry of a few seconds can take many minutes.
 function(q3d_end_to_end_entry entry fixture)
   add_test(NAME ${entry}
     COMMAND ${Q3D_PYTHON} ${Q3D_E2E} --program $<TARGET_FILE:quadruped3d> --faults $<TARGET_FILE:q3d_faults>
             --folder "${CMAKE_CURRENT_BINARY_DIR}/${fixture}" ${ARGN})
-  set_tests_properties(${entry} PROPERTIES LABELS e2e TIMEOUT 1200)
+  set_tests_properties(${entry} PROPERTIES LABELS e2e TIMEOUT 3600)
 endfunction()
