@@ -20,6 +20,7 @@ BUILD = ROOT / os.environ.get("BUILD", "build/release")
 JOBS = int(os.environ.get("JOBS") or os.cpu_count() or 1)
 CACHE = pathlib.Path(os.environ.get("XDG_CACHE_HOME") or pathlib.Path.home() / ".cache") / "quadruped3d-tidy"
 FINDING = re.compile(r"^(?P<place>[^\s:][^:]*:\d+:\d+): (?:warning|error): (?P<text>.*)$", re.MULTILINE)
+COMPILER = re.compile(r"(^|/)([a-z0-9_-]+-)?(cc|c\+\+|gcc|g\+\+|clang|clang\+\+)(-[0-9.]+)?$")
 COUNT = re.compile(r"^\d+ warnings?( and \d+ errors?)? (generated|treated as errors?)\.?$")
 INCLUDE = re.compile(r'^#include "([^"]+)"', re.MULTILINE)
 
@@ -86,8 +87,10 @@ def for_clang(entry: dict) -> dict:
     them, so that a finding names the header where it lies and every header has one name.
     """
     words = shlex.split(entry["command"]) if "command" in entry else entry["arguments"]
-    while not re.search(r"(^|/)(g\+\+|c\+\+|clang\+\+)[-0-9.]*$", words[0]):
+    while words and not COMPILER.search(words[0]):
         words = words[1:]
+    if not words:
+        stop(f"{entry['file']}: no compiler in its command: {entry.get('command', entry.get('arguments'))}")
     kept = [words[0], f"-I{ROOT}"]
     rest = iter(words[1:])
     for word in rest:

@@ -55,7 +55,8 @@ class Tidy(unittest.TestCase):
         self.write("build/release/compile_commands.json", json.dumps([
             {"directory": str(self.root / "build/release"), "file": str(self.root / "a" / name),
              "command": " ".join(["/usr/bin/ccache", "/usr/bin/c++", *flags, "-c", str(self.root / "a" / name)])}
-            for name in ("x.cpp", "y.cpp", "z.cpp")]))
+            for name in ("x.cpp", "y.cpp", "z.cpp")] + [
+            {"directory": str(self.root), "file": str(self.root / "a/c.c"), "command": "/usr/bin/cc -c a/c.c"}]))
         self.git("init", "--quiet", "--initial-branch=main")
         self.commit()
 
