@@ -11,7 +11,7 @@ ACCEPT_LICENCES ?=
 FUZZ_SECONDS ?= 60
 FUZZ_TARGETS ?=
 
-.PHONY: quadruped3d sample-model sample-loop test program build setup assets format tidy bench asan fuzz clean help
+.PHONY: quadruped3d sample-model sample-loop test program build setup assets format tidy nightly bench asan fuzz clean help
 
 quadruped3d: program  ## build the dataset that CONFIG describes (default: the rendered sample world)
 	tools/quadruped3d.sh $(OUT) $(CONFIG)
@@ -23,7 +23,7 @@ sample-loop: program  ## Stage 1, Stage 2, Stage 3 and their tables (SCHEDULE=fu
 	tools/sample_loop.sh loop $(SCHEDULE) $(SEED)
 
 test: build  ## build everything and run all tests
-	ctest --test-dir $(BUILD) --output-on-failure
+	ctest --test-dir $(BUILD) --output-on-failure --parallel $(JOBS)
 
 program: $(BUILD)/build.ninja  ## compile the program alone (release unless PRESET says otherwise)
 	@cmake --build $(BUILD) --parallel $(JOBS) --target quadruped3d
@@ -54,6 +54,12 @@ fuzz: setup  ## fuzz every reader of files for FUZZ_SECONDS each (clang; tests/f
 	cmake --preset fuzz
 	cmake --build build/fuzz --parallel $(JOBS) --target fuzz_targets
 	tools/fuzz.sh build/fuzz $(FUZZ_SECONDS) $(FUZZ_TARGETS)
+
+nightly:  ## all that CI has no time for: clang-tidy on every source, tests under the sanitizers, fuzzing
+	$(MAKE) build
+	BUILD=$(BUILD) JOBS=$(JOBS) tools/tidy.sh --all
+	$(MAKE) asan
+	$(MAKE) fuzz FUZZ_SECONDS=600
 
 format:  ## format every source in place
 	git ls-files '*.h' '*.cpp' | xargs clang-format -i

@@ -168,7 +168,10 @@ TEST_P(BrokenConfig, IsRefusedWithTheReason) {
 INSTANTIATE_TEST_SUITE_P(
     Keys, BrokenConfig,
     ::testing::Values(
-        Mutation{"/nmae", "1", "did you mean \"name\"?"}, Mutation{"/veto", "3", "\"veto\" must be a string"},
+        Mutation{"/nmae", "1", "did you mean \"name\"?"},
+        Mutation{"/netwrok", "{}", "did you mean \"network\"?"},
+        Mutation{"/datsets", "[]", "did you mean \"datasets\"?"},
+        Mutation{"/veto", "3", "\"veto\" must be a string"},
         Mutation{"/leakage", "{}", "\"test_sets\" must name at least one dataset"},
         Mutation{"/leakage", "{\"test_sets\": 3}", "must be a list of objects"},
         Mutation{"/leakage", "{\"test_sets\": [{\"name\": \"b\"}]}", "leakage: test_sets[0]"},
@@ -193,7 +196,7 @@ INSTANTIATE_TEST_SUITE_P(
         Mutation{"/datasets/0/role", "\"truht\"", "Did you mean \"truth\"?"},
         Mutation{"/network/dtype", "\"float16\"", "float32, bfloat16"},
         Mutation{"/network/batch", "0", "at least 1"},
-        Mutation{"/network/compute_threads", "-1", "0 (all cores) or more"},
+        Mutation{"/network/compute_threads", "-1", "must be at least 0"},
         Mutation{"/tta/objective", "\"papr\"", "Did you mean \"paper\"?"},
         Mutation{"/tta/learning_rate", "0", "greater than 0"},
         Mutation{"/tta/iterations_min", "7", "iterations_min <= iterations_max"},
@@ -206,17 +209,57 @@ INSTANTIATE_TEST_SUITE_P(
         Mutation{"/calibrate/retained", "0.9", "sum less than 1"},
         Mutation{"/profile", "\"strit\"", "Did you mean \"strict\"?"},
         Mutation{"/guards/visible_mn", "1", "did you mean \"visible_min\"?"},
-        Mutation{"/guards/visible_min", "27", "0 <= visible_min <= 26"},
-        Mutation{"/guards/iterations_full_at", "27", "0 (off) to 26"},
+        Mutation{"/guards/visible_min", "27", "must be 0 to 26"},
+        Mutation{"/guards/iterations_full_at", "27", "must be 0 to 26"},
         Mutation{"/guards/held_out_share", "1", "less than 1"},
-        Mutation{"/guards/held_out_patience", "-1", "0 (no limit) or more"},
-        Mutation{"/guards/mask_iou_min", "1.1", "mask_iou_min <= 1"},
-        Mutation{"/guards/limb_factor_max", "-1", "0 <= limb_factor_max"},
+        Mutation{"/guards/held_out_patience", "-1", "must be at least 0"},
+        Mutation{"/guards/mask_iou_min", "1.1", "must be 0 to 1"},
+        Mutation{"/guards/limb_factor_max", "-1", "must be at least 0"},
         Mutation{"/filter/datasets", R"({"b": {"tau_low": 0.1, "tau_high": 0.2}})", "Did you mean \"a\"?"},
         Mutation{"/filter/datasets", R"({"a": {"tau_low": 0.1}})", "belong together"},
         Mutation{"/filter/datasets", R"({"a": {"tau_hgh": 0.1}})", "did you mean \"tau_high\"?"},
         Mutation{"/filter/datasets", R"({"a": {"tau_low": 0.3, "tau_high": 0.2}})", "dataset a"},
         Mutation{"/filter/datasets", "[1]", "a dataset's name for each key"}));
+
+// The misspelt key is named, not only the one that is missing because of it.
+TEST(BuildConfig, AMisspeltKeyIsNamedWhereAnotherIsMissing) {
+  const auto refusal = [](const json& document) -> std::string {
+    try {
+      parse_build_config(document, "t");
+    } catch (const run::ConfigError& error) {
+      return error.what();
+    }
+    return "accepted";
+  };
+  for (const auto& [key, misspelt] : {std::pair("datasets", "dataset"), std::pair("network", "netwrok")}) {
+    json document = good();
+    document[misspelt] = document[key];
+    document.erase(key);
+    const std::string text = refusal(document);
+    EXPECT_NE(text.find(std::string("unknown key \"") + misspelt + "\"; did you mean \"" + key + "\"?"),
+              std::string::npos)
+        << text;
+  }
+  json document = good();
+  document["network"]["checkpont"] = document["network"]["checkpoint"];
+  document["network"].erase("checkpoint");
+  EXPECT_NE(refusal(document).find("\"checkpont\" is not known: did you mean \"checkpoint\"?"),
+            std::string::npos)
+      << refusal(document);
+}
+
+TEST(BuildConfig, EveryUnknownKeyIsToldAtOnce) {
+  json document = good();
+  document["shards"]["jpeg_qualty"] = 1;
+  document["shards"]["imags"] = 1;
+  try {
+    parse_build_config(document, "t");
+    FAIL();
+  } catch (const run::ConfigError& error) {
+    EXPECT_NE(std::string(error.what()).find("jpeg_quality"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("\"images\""), std::string::npos) << error.what();
+  }
+}
 
 TEST(BuildConfig, OneTauAloneIsRefused) {
   json config = good();
