@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "manifests/atomic_file.h"
+#include "pipeline/run/log.h"
 
 namespace q3d::pipeline::build {
 namespace {

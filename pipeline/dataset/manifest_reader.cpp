@@ -28,7 +28,8 @@ Counts counts_of(const json& counts) {
 template <typename Enum>
 std::map<Enum, std::int64_t> tally_of(const json& object, Enum (*from_string)(std::string_view)) {
   std::map<Enum, std::int64_t> tally;
-  for (const auto& [name, count] : object.items()) tally[from_string(name)] = count.get<std::int64_t>();
+  for (const auto& [name, count] : object.items())
+    tally[from_string(name)] = count.template get<std::int64_t>();
   return tally;
 }
 
@@ -84,13 +85,14 @@ void read_provenance(const json& provenance, DatasetManifest& manifest) {
   manifest.smal_asset_sha256 = text_of(provenance.at("smal_asset_sha256"));
   manifest.device = text_of(provenance.at("device"));
   const json& keys = provenance.at("stage_keys");
-  manifest.keys = {text_of(keys.at("ingest")),
-                   text_of(keys.at("predict")),
-                   text_of(keys.at("fidelity")),
-                   text_of(keys.at("refine")),
-                   text_of(keys.at("measure")),
-                   text_of(keys.at("shards")),
-                   manifest.key};
+  manifest.keys.ingest = text_of(keys.at("ingest"));
+  manifest.keys.predict = text_of(keys.at("predict"));
+  manifest.keys.fidelity = text_of(keys.at("fidelity"));
+  manifest.keys.refine = text_of(keys.at("refine"));
+  manifest.keys.measure = text_of(keys.at("measure"));
+  if (keys.contains("crops")) manifest.keys.crops = text_of(keys.at("crops"));  // 0.1.0 had no such stage
+  manifest.keys.shards = text_of(keys.at("shards"));
+  manifest.keys.dataset = manifest.key;
 }
 
 DatasetManifest manifest_of(const json& document) {

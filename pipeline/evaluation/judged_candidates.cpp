@@ -31,7 +31,7 @@ class StageTables {
   StageTables(const fs::path& out, const std::string& stage, const std::string& key)
       : folder_(stages::stage_folder(out, stage, key)), store_(opened(out, stage, key)) {}
 
-  manifests::Table load(std::int64_t unit) const {
+  manifests::Table load(std::int64_t unit) {
     if (auto table = store_.load_newest(unit)) return std::move(*table);
     fail(unit, "not finished");
   }
@@ -77,7 +77,7 @@ class PoolReader {
     }
   }
 
-  void read(std::span<const dataset::VerdictRow> verdicts, JudgedPool& pool) const {
+  void read(std::span<const dataset::VerdictRow> verdicts, JudgedPool& pool) {
     for (std::size_t first = 0; first < verdicts.size(); first += unit_size_) {
       const std::size_t count = std::min(unit_size_, verdicts.size() - first);
       read_unit(static_cast<std::int64_t>(first / unit_size_), verdicts.subspan(first, count), pool);
@@ -85,7 +85,7 @@ class PoolReader {
   }
 
  private:
-  void read_unit(std::int64_t unit, std::span<const dataset::VerdictRow> verdicts, JudgedPool& pool) const {
+  void read_unit(std::int64_t unit, std::span<const dataset::VerdictRow> verdicts, JudgedPool& pool) {
     const manifests::Table table = predictions_.load(unit);
     const std::vector<unit::PredictedSample> predicted = unit::predicted_from_table(table);
     if (predicted.size() != verdicts.size()) predictions_.fail(unit, "it was made anew for other candidates");

@@ -12,6 +12,7 @@
 #include "manifests/atomic_file.h"
 #include "manifests/shard.h"
 #include "pipeline/config/build_settings.h"
+#include "pipeline/run/log.h"
 
 namespace q3d::pipeline::stages {
 namespace {
