@@ -319,7 +319,7 @@ TEST_F(Rebuild, APictureThatIsNotThereIsAFailedSample) {
   fs::remove(scratch_.path() / "data/images/p3.png");
   const BuildSummary summary = run("out");
   EXPECT_EQ(summary.dataset.counts.failed, 1);
-  EXPECT_EQ(summary.dataset.reasons.at("image_missing"), 1);
+  EXPECT_EQ(summary.dataset.reasons.at(manifests::Reason::image_missing), 1);
 }
 
 }  // namespace
