@@ -132,7 +132,7 @@ TEST(CocoLabels, the_users_species_stands_over_the_category) {
   const Dataset dataset = lab.load(document);
   EXPECT_EQ(dataset.records[0].family, Family::none);
   EXPECT_THAT(joined(dataset.notes),
-              HasSubstr("species \"goat\" is none in the file and bovidae in the table"));
+              HasSubstr("species \"goat\" is none in the file and bovidae in the species table"));
   document["categories"][0]["name"] = "spider monkey";
   EXPECT_EQ(lab.load(document).records[0].failure, Reason::not_a_quadruped);
 }

@@ -81,7 +81,7 @@ TEST(Prima, a_family_that_the_file_states_wins_and_the_disagreement_is_noted) {
   EXPECT_EQ(dataset.records[0].species, "sheep");
   EXPECT_EQ(dataset.records[0].family, Family::equidae);
   EXPECT_THAT(joined(dataset.notes),
-              HasSubstr("species \"sheep\" is equidae in the file and bovidae in the table"));
+              HasSubstr("species \"sheep\" is equidae in the file and bovidae in the species table"));
   sheep["supercategory"] = -1;  // not stated
   EXPECT_EQ(folder.load_prima({sheep}).records[0].family, Family::bovidae);
 }

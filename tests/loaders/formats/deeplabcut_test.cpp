@@ -244,7 +244,7 @@ TEST(PickledNames, refuses_code_and_other_shapes) {
   };
   EXPECT_THAT(refusal("cos\nsystem\n(Vecho\ntR."),
               HasSubstr("here: byte 1 of its pickle: got the opcode 0x63"));
-  EXPECT_THAT(refusal("(lp0\ng0\na."), HasSubstr("got more for a list that lies in another"))
+  EXPECT_THAT(refusal("(lp0\ng0\na."), HasSubstr("got an item for a list that is already part of another"))
       << "a list within itself";
   EXPECT_THAT(refusal("(lp0\n(I1\n"), HasSubstr("its end"));
   EXPECT_THAT(refusal("a."), HasSubstr("nothing on the stack"));
@@ -276,7 +276,7 @@ TEST(PickledNames, what_a_pickle_can_claim_is_bounded) {
   EXPECT_EQ(read_pickled_columns(columns("snout", 8, 3), "here"),
             std::vector(3, std::vector<std::string>(8, "snout")));
   EXPECT_THAT(refusal(columns("snout", 9, 1)), HasSubstr("at most 8 names in a tuple"));
-  EXPECT_THAT(refusal(columns(std::string(1001, 'x'), 1, 1)), HasSubstr("1000 bytes a name"));
+  EXPECT_THAT(refusal(columns(std::string(1001, 'x'), 1, 1)), HasSubstr("1000 bytes in a name"));
   EXPECT_THAT(refusal(columns("snout", 1, 100'001)), HasSubstr("a pickle of another form"));
 }
 

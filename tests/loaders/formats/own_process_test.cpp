@@ -49,7 +49,7 @@ TEST(OwnProcess, OutlivesAnExit) {
 
 TEST(OwnProcess, EndsWorkThatHangs) {
   EXPECT_THAT(refusal_of([]() -> std::string { return pause(), std::string("awake"); }, seconds(1)),
-              HasSubstr("after 1 s"));
+              HasSubstr("more than 1 s"));
 }
 
 }  // namespace

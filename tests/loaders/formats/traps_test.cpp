@@ -95,7 +95,9 @@ TEST(Traps, trap_07_masks_that_are_missing_or_are_the_picture) {
     EXPECT_EQ(dataset.records[i].mask_path, "");
   }
   EXPECT_NE(dataset.records[2].mask_path, "");
-  EXPECT_THAT(joined(dataset.notes), HasSubstr("not there (no mask): 1 record, first set/train/"));
+  EXPECT_THAT(
+      joined(dataset.notes),
+      HasSubstr("names a file that does not exist, so the sample has no mask: 1 record, first set/train/"));
   EXPECT_THAT(joined(dataset.notes),
               HasSubstr("names the picture itself, so the sample has no mask: 1 record"));
   // 0/1 masks and photographs under another name: DecodeMask.kinds_are_told_apart.
@@ -224,7 +226,7 @@ TEST(Traps, trap_13_absolute_names_of_the_authors_disk) {
   EXPECT_EQ(dataset.records[0].id, "set/train/horse_11361_0.png#7");
   EXPECT_EQ(dataset.records[1].failure, Reason::none) << dataset.records[1].failure_detail;
   EXPECT_EQ(dataset.records[2].failure, Reason::path_escapes_root);
-  EXPECT_THAT(joined(dataset.notes), HasSubstr("found by their last parts: 1"));
+  EXPECT_THAT(joined(dataset.notes), HasSubstr("found by the last parts of the name: 1"));
 }
 
 TEST(Traps, trap_13_equal_base_names_are_told_apart_by_their_folders) {
@@ -320,7 +322,7 @@ TEST(Traps, trap_16_betas_in_one_list_or_two_or_the_first_alone) {
   EXPECT_EQ(dataset.records[1].truth->betas[19], 0.2F);
   EXPECT_EQ(dataset.records[1].truth->betas[20], 0.0F);
   EXPECT_EQ(dataset.records[2].failure, Reason::record_malformed);
-  EXPECT_THAT(joined(dataset.notes), HasSubstr("no shape_extra"));
+  EXPECT_THAT(joined(dataset.notes), HasSubstr("shape_extra is missing"));
 }
 
 TEST(Traps, trap_17_zeros_are_no_truth_and_single_zeros_do_not_undo_it) {
