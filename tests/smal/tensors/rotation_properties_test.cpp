@@ -47,7 +47,7 @@ torch::Tensor any_rot6d() {
 
 // An axis-angle vector of at most half a turn less 0.01 rad.
 torch::Tensor any_axis_angle() {
-  return any_vector((M_PI - 0.01) / std::sqrt(3.0));
+  return any_vector(1) * ((M_PI - 0.01) / std::sqrt(3.0));
 }
 
 void assert_is_rotation(const torch::Tensor& matrix) {
