@@ -8,6 +8,7 @@
 
 #include "manifests/atomic_file.h"
 #include "tests/support/paths.h"
+#include "tests/support/told.h"
 
 namespace q3d::pipeline::stages {
 namespace {
@@ -200,15 +201,14 @@ TEST(StageKeys, ThresholdsOfADatasetCount) {
 
 class StageFolder : public ::testing::Test {
  protected:
-  void open(const std::string& key) {
-    open_stage_folder(folder_, "predict", key, [this](const std::string& line) { told_.push_back(line); });
-  }
+  void open(const std::string& key) { open_stage_folder(folder_, "predict", key); }
   void write_manifest(const std::string& text) { std::ofstream(folder_ / "manifest.json") << text; }
 
   testing::ScratchDir scratch_;
   const std::string key_ = std::string(64, 'a');
   std::filesystem::path folder_ = stage_folder(scratch_.path(), "predict", key_);
-  std::vector<std::string> told_;
+  q3d::testing::Told log_;
+  std::vector<std::string>& told_ = log_.warnings;
 };
 
 TEST_F(StageFolder, RefusesAFolderOfAnotherKey) {

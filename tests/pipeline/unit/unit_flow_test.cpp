@@ -102,7 +102,7 @@ TEST(UnitFlow, NoUnitsIsNoWork) {
   EXPECT_TRUE(recorder.written.empty());
 }
 
-TEST(device::DeviceWorker, RunWaitsAndRethrows) {
+TEST(DeviceWorker, RunWaitsAndRethrows) {
   device::DeviceWorker device;
   int value = 0;
   device.run([&] { value = 3; });
