@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "manifests/csv.h"
@@ -56,8 +57,8 @@ RC_GTEST_PROP(CsvProperties, EmptyLinesBetweenRowsChangeNothing, ()) {
 }
 
 RC_GTEST_PROP(CsvProperties, PlainTextStaysAsItIs, ()) {
-  const std::string text = *testing::awkward_text();
-  RC_PRE(text.find_first_of(",\"\r\n") == std::string::npos);
+  std::string text = *testing::awkward_text();
+  std::erase_if(text, [](char c) { return std::string_view(",\"\r\n").find(c) != std::string_view::npos; });
   RC_ASSERT(csv_cell(text) == text);
 }
 

@@ -57,7 +57,7 @@ class DamagedStages(Case):
     def expect_told(self, result, path):
         """A line on stderr names the file and says that something is made anew."""
         told = [line for line in result.stderr.splitlines() if f"{path.parent.name}/{path.name}" in line]
-        self.assertTrue(any("again" in line for line in told), result.stderr)
+        self.assertTrue(any("made again" in line for line in told), result.stderr)
 
     def test_a_refine_table(self):
         first, second, *_ = self.units("refine")
@@ -89,7 +89,7 @@ class DamagedStages(Case):
 
     def test_a_whole_table_is_taken_as_it_is(self):
         result = self.scene.build("out", "--json", config=self.shared / "quality.json")
-        self.assertNotIn("anew", result.stderr)
+        self.assertNotIn("made again", result.stderr)
 
 
 class UnreadablePictures(Case):
