@@ -172,9 +172,6 @@ TEST_F(MetricsParity, ProcrustesAlignedKeypoints) {
 TEST_F(MetricsParity, PaMpjpe) {
   for (std::size_t i = 0; i < cases_.size(); ++i) {
     const double tolerance = alignment_rounding(golden("pred_keypoints_3d", i), true_keypoints_3d(i));
-    if (getenv("MEASURE"))
-      printf("MPJPE %s %.3e tol %.3e\n", cases_[i].c_str(), std::abs(pa_mpjpe(i) - number("pa_mpjpe", i)),
-             kMmPerUnit * tolerance);
     EXPECT_NEAR(pa_mpjpe(i), number("pa_mpjpe", i), kMmPerUnit * tolerance) << cases_[i];
     if (cases_[i] == "perfect") {
       EXPECT_LT(pa_mpjpe(i), 1e-9);
@@ -192,9 +189,6 @@ TEST_F(MetricsParity, PaMpvpe) {
   for (std::size_t i = 0; i < cases_.size(); ++i) {
     const auto row = static_cast<std::int64_t>(i);
     const double tolerance = alignment_rounding(predicted[row], truth[row]);
-    if (getenv("MEASURE"))
-      printf("MPVPE %s %.3e tol %.3e\n", cases_[i].c_str(),
-             std::abs(pa_mpvpe(predicted[row], truth[row]) - number("pa_mpvpe", i)), kMmPerUnit * tolerance);
     EXPECT_NEAR(pa_mpvpe(predicted[row], truth[row]), number("pa_mpvpe", i), kMmPerUnit * tolerance)
         << cases_[i];
   }

@@ -37,9 +37,6 @@ void expect_scores_and_losses(torch::ScalarType dtype, double tolerance) {
   const torch::Tensor predicted = discriminator.forward(given("pose").view({-1, 34, 3, 3}), given("betas"));
   const torch::Tensor rotations = smal::tensors::axis_angle_to_matrix(given("gt_pose_aa").view({-1, 34, 3}));
   const torch::Tensor real = discriminator.forward(rotations, given("gt_betas"));
-  if (getenv("MEASURE"))
-    printf("DISC %.3e %.3e max %.2e\n", (predicted - file.tensor("out_fake")).abs().max().item<double>(),
-           (real - file.tensor("out_real")).abs().max().item<double>(), real.abs().max().item<double>());
   testing::expect_close("out_fake", predicted, file.tensor("out_fake"), tolerance);
   testing::expect_close("out_real", real, file.tensor("out_real"), tolerance);
   const double adversarial = file.tensor("loss_adv").item<double>();

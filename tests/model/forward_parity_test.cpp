@@ -59,6 +59,16 @@ TensorMap observe_all(const Prima& prima, const torch::Tensor& input_index) {
   return seen;
 }
 
+// float32 rounds sums that moved weights do not show, so twice their noise. The resized picture has no
+// weights: its samples lie at float32 coordinates of up to 256 px (rounded by 1.5e-5 px), and the normalised
+// picture changes by up to 4.5 from one pixel to the next.
+torch::Tensor intermediate_tolerance(const std::string& name, const torch::Tensor& noise,
+                                     const torch::Tensor& expected) {
+  constexpr double kResized = 1.5e-5 * 4.5;
+  return 2.0 * (kNoiseFactor * noise + few_roundings(expected)) +
+         (name == "bioclip_resized_img" ? kResized : 0.0);
+}
+
 class ForwardParity : public ::testing::TestWithParam<std::string> {
  protected:
   Prima prima(torch::ScalarType dtype) const { return testing::parity_prima(GetParam(), dtype); }
@@ -77,9 +87,6 @@ class ForwardParity : public ::testing::TestWithParam<std::string> {
 
 TEST_P(ForwardParity, EveryOutput) {
   for (const auto& [name, tensor] : as_official(predict(prima(torch::kFloat64)))) {
-    if (getenv("MEASURE"))
-      printf("OUT %s %s err %.3e table %.3e\n", GetParam().c_str(), name.c_str(),
-             (tensor - golden_.tensor(name)).abs().max().item<double>(), stated_noise(name));
     expect_close(name, tensor, golden_.tensor(name), 1.5 * stated_noise(name) + 1e-7);
   }
 }
@@ -95,15 +102,7 @@ TEST_P(ForwardParity, EveryIntermediate) {
     }
     ASSERT_TRUE(seen.contains(name)) << name << " is not observed";
     const torch::Tensor expected = golden_.tensor(name);
-    if (getenv("MEASURE")) {
-      auto e = (seen.at(name) - expected).abs();
-      auto n = noise.at(name);
-      auto nn = n.dim() > 0 ? n : n;
-      printf("MID %s %-40s err %.3e noise %.3e ratio %.2f few %.2e\n", GetParam().c_str(), name.c_str(),
-             e.max().item<double>(), n.max().item<double>(), (e / n).max().item<double>(),
-             few_roundings(expected).item<double>());
-    }
-    expect_close(name, seen.at(name), expected, kNoiseFactor * noise.at(name) + few_roundings(expected));
+    expect_close(name, seen.at(name), expected, intermediate_tolerance(name, noise.at(name), expected));
     ++compared;
   }
   EXPECT_GE(compared, 20);
@@ -116,10 +115,6 @@ TEST_P(ForwardParity, Float32IsNearFloat64) {
   const TensorMap noise = testing::float32_noise(GetParam(), testing::parity_config(GetParam()), compute);
   for (const auto& [name, tensor] : compute(prima(torch::kFloat32))) {
     EXPECT_EQ(tensor.scalar_type(), torch::kFloat32) << name;
-    if (getenv("MEASURE"))
-      printf("F32 %s %s err %.3e noise %.3e ratio %.2f\n", GetParam().c_str(), name.c_str(),
-             (tensor - exact.at(name)).abs().max().item<double>(), noise.at(name).max().item<double>(),
-             ((tensor - exact.at(name)).abs() / noise.at(name)).max().item<double>());
     expect_close(name, tensor, exact.at(name), kFloat32Factor * noise.at(name) + few_roundings(tensor));
   }
 }

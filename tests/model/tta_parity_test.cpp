@@ -118,14 +118,6 @@ class TtaParity : public ::testing::TestWithParam<Case> {
     const std::string key = case_prefix(GetParam(), sample) + name;
     const torch::Tensor expected = golden(key);
     torch::Tensor tolerance = kNoiseFactor * noise().at(key) + few_roundings(expected);
-    if (getenv("MEASURE")) {
-      const auto e = (got.at(key) - expected).abs();
-      const auto st = stated_noise(GetParam(), sample, name);
-      printf("TTA %s %-40s err %.2e noise %.2e ratio %.2f stated %.2e share %.3f\n",
-             std::get<0>(GetParam()).c_str(), key.c_str(), e.max().item<double>(),
-             noise().at(key).max().item<double>(), (e / noise().at(key)).max().item<double>(),
-             st.value_or(-1), (e / tolerance).max().item<double>());
-    }
     if (const auto stated = stated_noise(GetParam(), sample, name)) {
       tolerance = torch::minimum(tolerance, torch::tensor(1.5 * *stated + 1e-7, torch::kFloat64));
     }
@@ -144,15 +136,6 @@ class TtaParity : public ::testing::TestWithParam<Case> {
         kNoiseFactor * noise().at(prefix + "before_" + name) + few_roundings(golden(prefix + name));
     const torch::Tensor tolerance = 0.02 * expected.abs() + rounding;
     const torch::Tensor error = (change - expected).abs();
-    if (getenv("MEASURE"))
-      printf(
-          "SLOW %s %s moved max %.2e mean %.2e rounding %.2e err max %.2e norm share %.4f share %.3f "
-          "tolnorm/moved %.3f nratio %.2f\n",
-          std::get<0>(GetParam()).c_str(), (prefix + name).c_str(), expected.abs().max().item<double>(),
-          expected.abs().mean().item<double>(), rounding.max().item<double>(), error.max().item<double>(),
-          (error.norm() / expected.norm()).item<double>(), (error / tolerance).max().item<double>(),
-          (tolerance.norm() / expected.norm()).item<double>(),
-          (error / noise().at(prefix + "before_" + name)).max().item<double>());
     EXPECT_LE((error / tolerance).max().item<double>(), 1.0);
     EXPECT_LE(error.norm().item<double>(),
               0.02 * expected.norm().item<double>() + rounding.max().item<double>());
@@ -188,10 +171,6 @@ TEST_P(TtaParity, Float32IsNear) {
   const TensorMap exact = adapted(GetParam(), exact_, 0, kSamples);
   const TensorMap single = adapted(GetParam(), testing::parity_prima(std::get<0>(GetParam())), 0, kSamples);
   for (const auto& [name, tensor] : single) {
-    if (getenv("MEASURE"))
-      printf("T32 %s %-40s err %.2e noise %.2e ratio %.2f\n", std::get<0>(GetParam()).c_str(), name.c_str(),
-             (tensor - exact.at(name)).abs().max().item<double>(), noise().at(name).max().item<double>(),
-             ((tensor - exact.at(name)).abs() / noise().at(name)).max().item<double>());
     expect_close(name, tensor, exact.at(name), kFloat32Factor * noise().at(name) + few_roundings(tensor));
   }
 }

@@ -48,9 +48,6 @@ void expect_close(const torch::Tensor& got, const torch::Tensor& expected, const
   ASSERT_TRUE(got.isfinite().all().item<bool>());
   const torch::Tensor error = (exact(got) - exact(expected)).abs();
   const std::int64_t worst = (error / tolerance).argmax().item<std::int64_t>();
-  if (getenv("MEASURE"))
-    printf("SMAL %s share %.3f err %.3e\n", ::testing::UnitTest::GetInstance()->current_test_info()->name(),
-           (error / tolerance).max().item<double>(), error.max().item<double>());
   EXPECT_LE((error / tolerance).max().item<double>(), 1.0)
       << "difference " << error.flatten()[worst].item<double>() << " at element " << worst << ", tolerance "
       << tolerance.expand_as(error).flatten()[worst].item<double>();
