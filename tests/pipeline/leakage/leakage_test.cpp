@@ -205,10 +205,11 @@ TEST_F(Leakage, hashes_are_made_once_for_a_content) {
   const std::string sha(64, 'a');
   const std::string other(64, 'b');
   const fs::path cache = scratch_.path() / "hashes.txt";
+  std::ofstream(root() / "text.png") << "no picture";
   PictureHashes first(cache);
-  first.add({{(root() / "a.png").string(), sha}, {(root() / "nowhere.png").string(), other}}, true);
+  first.add({{(root() / "a.png").string(), sha}, {(root() / "text.png").string(), other}}, true);
   ASSERT_TRUE(first.find(sha));
-  EXPECT_FALSE(first.find(other)) << "it cannot be read";
+  EXPECT_FALSE(first.find(other)) << "it cannot be decoded";
   fs::remove(root() / "a.png");
   PictureHashes second(cache);
   second.add({{(root() / "a.png").string(), sha}}, true);
@@ -219,6 +220,8 @@ TEST_F(Leakage, hashes_are_made_once_for_a_content) {
   std::ofstream(cache) << lines;
   PictureHashes third(cache);
   EXPECT_FALSE(third.find(sha));
+  EXPECT_THROW(third.add({{(root() / "a.png").string(), sha}}, true), std::runtime_error)
+      << "a picture that was there a moment ago and is gone says nothing of its content";
 }
 
 }  // namespace
