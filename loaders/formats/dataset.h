@@ -10,10 +10,10 @@
 namespace q3d::loaders::formats {
 
 struct DatasetOptions {
-  std::string name;            // becomes the first part of every sample id
-  std::string format;          // one of dataset_formats()
-  std::string split = "train"; // second part of every sample id
-  std::filesystem::path root;  // pictures and masks are looked up below this folder, and never outside it
+  std::string name;             // becomes the first part of every sample id
+  std::string format;           // one of dataset_formats()
+  std::string split = "train";  // second part of every sample id
+  std::filesystem::path root;   // pictures and masks are looked up below this folder, and never outside it
   std::filesystem::path annotations;  // JSON file; relative to root unless absolute
   // Folder of the pictures, relative to root unless it is absolute. If the user names a folder outside the
   // root, pictures may lie there. If it is empty, the format's own folder is used: root (prima), root/images

@@ -9,9 +9,9 @@
 namespace q3d::loaders::keypoints {
 namespace {
 
-using ::testing::HasSubstr;
 using formats::testing_files::json;
 using formats::testing_files::write_text;
+using ::testing::HasSubstr;
 
 Topology shipped(const std::string& file) {
   return read_topology_file(q3d::testing::source_dir() / "configs/topologies" / (file + ".json"));
