@@ -37,9 +37,10 @@ class PrimaNet;  // the torch module, with the official checkpoint's parameter n
 
 // A loaded network on its device. Copies share the weights. Not thread-safe: one caller at a time.
 //
-// dtype float32, or bfloat16: then the matrices of both encoders, of the decoder layers and of the keypoint
-// readouts are held and multiplied in bfloat16, while the residual streams, layer norms, embeddings,
-// regression heads, the body, the losses and all of test-time adaptation's parameters stay float32.
+// dtype float32, float64 (all of it, for comparisons with the official code), or bfloat16: then the matrices
+// of both encoders, of the decoder layers and of the keypoint readouts are held and multiplied in bfloat16,
+// while the residual streams, layer norms, embeddings, regression heads, the body, the losses and all of
+// test-time adaptation's parameters stay float32.
 class Prima {
  public:
   // Strict: throws std::runtime_error naming every missing, extra, wrong-shaped or wrongly typed tensor. The
@@ -53,7 +54,7 @@ class Prima {
 
   // crops (B, 3, 256, 256) uint8 RGB (any device) -> normalised float input on the network's device.
   torch::Tensor normalise(const torch::Tensor& crops_u8) const;
-  // images (B, 3, 256, 256) float32, normalised.
+  // images (B, 3, 256, 256), normalised; float32, or float64 for a float64 network.
   ImageFeatures encode(const torch::Tensor& images) const;
   Prediction predict(const ImageFeatures& features, bool with_vertices = false) const;
   // All three throw std::invalid_argument naming the tensor, got and expected, and record no gradients.

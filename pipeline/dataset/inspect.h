@@ -26,7 +26,7 @@ FoundSample find_sample(const std::filesystem::path& path, const std::string& id
 // Everything that is stored of one sample but its picture. Throws like find_sample.
 nlohmann::ordered_json describe_sample(const std::filesystem::path& path, const std::string& id);
 
-// The same for people: a page of at most some forty lines. They throw like the functions above.
+// The same for people: a page of at most some sixty lines. They throw like the functions above.
 std::string page(const std::filesystem::path& path);
 std::string sample_page(const std::filesystem::path& path, const std::string& id);
 
