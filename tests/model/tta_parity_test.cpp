@@ -120,8 +120,9 @@ class TtaParity : public ::testing::TestWithParam<Case> {
     torch::Tensor tolerance = kNoiseFactor * noise().at(key) + few_roundings(expected);
     // A golden vertex went through a chain of float32 joint transforms that moved weights do not round.
     if (name == "vertices_every32") tolerance = 2.0 * tolerance;
-    // The golden losses are float32 sums of up to 104 terms, each of which is rounded.
-    if (name.starts_with("loss")) tolerance = tolerance + 104 * few_roundings(expected) / 4;
+    // A golden loss is a float32 sum of up to 104 terms, each of which is rounded, over keypoints that the
+    // whole float32 network left off by up to 2e-6 crop units.
+    if (name.starts_with("loss")) tolerance = tolerance + 26.0 * few_roundings(expected) + 2e-6;
     if (const auto stated = stated_noise(GetParam(), sample, name)) {
       tolerance = torch::minimum(tolerance, torch::tensor(1.5 * *stated + 1e-7, torch::kFloat64));
     }
