@@ -7,11 +7,13 @@
 #include <stdexcept>
 #include <string>
 
+#include "smal/camera.h"
+#include "smal/sizes.h"
+
 namespace q3d::filters {
 namespace {
 
-constexpr std::size_t kKeypoints = 26;
-constexpr double kCropSidePx = 256.0;
+constexpr std::size_t kKeypoints = smal::kNumKeypoints;
 constexpr int kAucThresholds = 100;
 
 void check_keypoints(std::span<const float> projected, std::span<const float> annotated) {
@@ -89,7 +91,7 @@ std::optional<double> pck(std::span<const float> projected, std::span<const floa
     const Offset offset = offset_of(projected, annotated, k);
     if (!(offset.weight > 0)) continue;
     total_weight += offset.weight;
-    const double distance_px = kCropSidePx * std::hypot(offset.dx, offset.dy);
+    const double distance_px = smal::kCropSidePx * std::hypot(offset.dx, offset.dy);
     // Without a mask area the ratio is infinite, or 0 / 0 = NaN: no hit either way.
     if (distance_px / normaliser_px < threshold) hit_weight += offset.weight;
   }

@@ -10,11 +10,13 @@
 #include <string>
 #include <string_view>
 
+#include "smal/body.h"
+
 namespace q3d::manifests {
 
-inline constexpr int kNumKeypoints = 26;  // Animal3D / SMAL keypoints
-inline constexpr int kNumJoints = 35;     // SMAL joints; joint 0 carries the global orientation
-inline constexpr int kNumBetas = 41;      // SMAL shape coefficients
+using smal::kNumBetas;
+using smal::kNumJoints;
+using smal::kNumKeypoints;  // of Animal3D, which are SMAL's
 
 // One annotated keypoint, in pixels of the source image as stored (EXIF orientation is never applied), with
 // the origin at the top left. `v` is the file's own value, unchanged (-1, 0, 1, 2, or a likelihood). `weight`
@@ -40,15 +42,15 @@ enum class Family : std::int8_t { none = -1, felidae = 0, canidae, equidae, bovi
 std::string_view to_string(Family family);
 Family family_from_string(std::string_view name);  // throws std::invalid_argument on an unknown name
 
-// The body of an annotation file. Sets with 2D keypoints only have none.
+// The body of an annotation file, in the file's own form. Sets with 2D keypoints only have none.
 struct BodyTruth {
   bool has_pose = false;   // not all 105 numbers are zero
   bool has_betas = false;  // not all 41 numbers are zero
   bool has_keypoints_3d = false;
-  std::array<float, kNumJoints * 3> pose_axis_angle{};  // rad; [0:3] is the global orientation
-  std::array<float, kNumBetas> betas{};
-  std::array<float, 3> trans{};                         // SMAL units, camera frame, focal 1000 px at 256 px
-  std::array<float, kNumKeypoints * 3> keypoints_3d{};  // SMAL units (about metres), y down
+  smal::AxisAnglePose pose_axis_angle{};
+  smal::Betas betas{};
+  smal::Translation trans{};
+  smal::Keypoints3d keypoints_3d{};
 };
 
 // Why a sample failed or was discarded. The names must not change, because they are written into lists and

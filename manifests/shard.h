@@ -10,6 +10,7 @@
 #include "manifests/sample.h"
 #include "manifests/table_reader.h"
 #include "manifests/verdict.h"
+#include "smal/body.h"
 
 namespace q3d::manifests {
 
@@ -34,17 +35,12 @@ struct ShardSample {
   std::array<double, 6> crop_from_image{};  // 2x3 affine, image px -> stored-crop px
   std::array<double, 3> patch_box{};        // centre x, centre y, side: the network's square crop, image px
 
-  // The label. Rotations are matrices. trans and keypoints_3d are in the axes of the 256-px crop's camera
-  // (x right, y down, z forward), SMAL units, focal 1000 px at 256 px; trans is not yet added to
-  // keypoints_3d.
+  // The label. The body's translation is not yet added to keypoints_3d.
   bool has_pose = false;
   bool has_betas = false;
   bool has_keypoints_3d = false;
-  std::array<float, kNumJoints * 9> pose{};  // (35, 3, 3), joint 0 = global orientation
-  std::array<float, kNumBetas> betas{};
-  std::array<float, 3> camera{};  // weak-perspective (s, tx, ty)
-  std::array<float, 3> trans{};   // (tx, ty, 2 f / (256 s))
-  std::array<float, kNumKeypoints * 3> keypoints_3d{};
+  smal::Body body;
+  smal::Keypoints3d keypoints_3d{};
   std::array<float, kNumKeypoints * 2> projected_2d{};  // keypoints of the body, crop units
 };
 

@@ -14,7 +14,7 @@ namespace {
 
 using Shape = std::vector<std::int64_t>;
 
-// `access(sample)` gives a reference to an array or number whose bytes are the row.
+// `access(sample)` gives a reference to a value whose bytes are the row.
 template <typename T, typename Access>
 ShardColumn numbers(std::string name, Shape shape, std::string units, std::string meaning, Access access) {
   const std::size_t bytes = static_cast<std::size_t>(elements_per_row(shape)) * sizeof(T);
@@ -256,15 +256,15 @@ Columns label_columns() {
       flag("has_keypoints_3d", "1 when keypoints_3d is a label", &ShardSample::has_keypoints_3d),
       numbers<float>(
           "pose", {kNumJoints, 3, 3}, "", "rotation matrices; joint 0 is the global orientation",
-          [](auto& s) -> auto& { return s.pose; }),
+          [](auto& s) -> auto& { return s.body.pose; }),
       numbers<float>(
-          "betas", {kNumBetas}, "", "SMAL shape coefficients", [](auto& s) -> auto& { return s.betas; }),
+          "betas", {kNumBetas}, "", "SMAL shape coefficients", [](auto& s) -> auto& { return s.body.betas; }),
       numbers<float>(
           "camera", {3}, "", "weak-perspective camera (s, tx, ty)",
-          [](auto& s) -> auto& { return s.camera; }),
+          [](auto& s) -> auto& { return s.body.camera; }),
       numbers<float>(
           "trans", {3}, "SMAL units", "translation of the body in the camera frame",
-          [](auto& s) -> auto& { return s.trans; }),
+          [](auto& s) -> auto& { return s.body.translation; }),
       numbers<float>(
           "keypoints_3d", {kNumKeypoints, 3}, "SMAL units", "3D keypoints of the body before trans is added",
           [](auto& s) -> auto& { return s.keypoints_3d; }),

@@ -4,13 +4,14 @@
 
 #include <stdexcept>
 
+#include "smal/sizes.h"
 #include "smal/tensors/camera.h"
 #include "smal/tensors/rotation.h"
 
 namespace q3d::model {
 namespace {
 
-constexpr std::int64_t kJoints = 35;
+constexpr std::int64_t kJoints = smal::kNumJoints;
 
 }  // namespace
 

@@ -10,12 +10,13 @@
 
 #include "model/config.h"
 #include "model/layers.h"
+#include "smal/sizes.h"
 
 namespace q3d::model {
 
-inline constexpr std::int64_t kKeypoints = 26;
-inline constexpr std::int64_t kPose6d = 210;  // 35 joints x 6
-inline constexpr std::int64_t kBetas = 41;
+inline constexpr std::int64_t kKeypoints = smal::kNumKeypoints;
+inline constexpr std::int64_t kPose6d = smal::kNumJoints * 6;
+inline constexpr std::int64_t kBetas = smal::kNumBetas;
 inline constexpr std::int64_t kCamera = 3;
 
 // What test-time adaptation may change: the keypoint embeddings and the three regression heads. Either the

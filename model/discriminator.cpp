@@ -5,11 +5,13 @@
 
 #include "model/decoder.h"
 #include "model/seeded_uniform.h"
+#include "smal/sizes.h"
 
 namespace q3d::model {
 namespace {
 
-constexpr std::int64_t kBodyJoints = 34;  // all but the one that carries the global orientation
+constexpr std::int64_t kBodyJoints =
+    smal::kNumJoints - 1;  // all but the one that carries the global orientation
 constexpr std::int64_t kRotationNumbers = 9;
 constexpr std::int64_t kJointWidth = 32;
 constexpr std::int64_t kHiddenWidth = 1024;

@@ -10,6 +10,7 @@
 #include "model/mixed_precision.h"
 #include "model/module_state.h"
 #include "model/partial_mean.h"
+#include "smal/camera.h"
 
 namespace q3d::model {
 namespace {
@@ -19,7 +20,7 @@ constexpr const char* kOptimiser = "training.optimiser.";
 constexpr const char* kSteps = "training.steps";
 
 // The ViT sees columns 32 to 224 of the 256-px crop, in patches of 16 px that begin 2 px before the edge.
-constexpr double kCropPx = 256.0;
+constexpr double kCropPx = smal::kCropSidePx;
 constexpr double kPatchPx = 16.0;
 constexpr double kFirstCentrePx = kPatchPx / 2 - 2.0;
 constexpr double kLeftPx = 32.0;

@@ -7,12 +7,13 @@
 #include <vector>
 
 #include "model/decoder.h"
+#include "smal/sizes.h"
 #include "smal/tensors/rotation.h"
 
 namespace q3d::model {
 namespace {
 
-constexpr std::int64_t kJoints = 35;
+constexpr std::int64_t kJoints = smal::kNumJoints;
 constexpr double kTemperature = 0.1;
 constexpr double kBaseTemperature = 0.07;
 

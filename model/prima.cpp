@@ -8,13 +8,12 @@
 #include "model/assemble.h"
 #include "model/checkpoint.h"
 #include "model/net.h"
+#include "smal/camera.h"
 #include "smal/tensors/asset.h"
 #include "smal/tensors/safetensors.h"
 
 namespace q3d::model {
 namespace {
-
-constexpr std::int64_t kCropSidePx = 256;
 
 // Of ImageNet, on the scale 0..255: float32 constants in the official code, whatever the network's dtype.
 torch::Tensor per_channel(double red, double green, double blue, torch::TensorOptions options) {
@@ -25,8 +24,8 @@ torch::Tensor per_channel(double red, double green, double blue, torch::TensorOp
 }
 
 void require_crops(const char* name, const torch::Tensor& crops, torch::ScalarType dtype) {
-  if (crops.dim() != 4 || crops.size(1) != 3 || crops.size(2) != kCropSidePx ||
-      crops.size(3) != kCropSidePx || crops.scalar_type() != dtype) {
+  if (crops.dim() != 4 || crops.size(1) != 3 || crops.size(2) != smal::kCropSidePx ||
+      crops.size(3) != smal::kCropSidePx || crops.scalar_type() != dtype) {
     throw std::invalid_argument(fmt::format(
         "{}: expected (B, 3, 256, 256) {}, got {} dimensions, {} numbers, {}", name, torch::toString(dtype),
         crops.dim(), crops.numel(), torch::toString(crops.scalar_type())));

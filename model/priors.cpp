@@ -7,11 +7,12 @@
 #include <vector>
 
 #include "model/decoder.h"
+#include "smal/sizes.h"
 
 namespace q3d::model {
 namespace {
 
-constexpr std::int64_t kPoseNumbers = 105;
+constexpr std::int64_t kPoseNumbers = smal::kNumJoints * 3;
 
 // The official names.
 constexpr const char* kMeanPose = "pose_prior_loss.mean_pose";

@@ -14,8 +14,8 @@ Eigen::Matrix3d rotation_matrix(const Eigen::Vector3d& axis_angle) {
 
 }  // namespace
 
-std::array<float, kNumJoints * 9> rotation_matrices(const std::array<float, kNumJoints * 3>& axis_angle) {
-  std::array<float, kNumJoints * 9> matrices{};
+Pose rotation_matrices(const AxisAnglePose& axis_angle) {
+  Pose matrices{};
   for (std::size_t joint = 0; joint < kNumJoints; ++joint) {
     const float* turn = &axis_angle[3 * joint];
     const Eigen::Matrix<float, 3, 3, Eigen::RowMajor> matrix =

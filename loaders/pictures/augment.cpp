@@ -74,8 +74,7 @@ Affine augmented_patch_from_image(const SquareBox& box, const Augmentation& augm
   return augmentation.mirror ? compose(kTurnedOver, upright) : upright;
 }
 
-std::array<float, manifests::kNumKeypoints * 3> rotate_keypoints_3d(
-    const std::array<float, manifests::kNumKeypoints * 3>& keypoints, double rotation_deg) {
+smal::Keypoints3d rotate_keypoints_3d(const smal::Keypoints3d& keypoints, double rotation_deg) {
   const double angle_rad = -rotation_deg * std::numbers::pi / 180.0;
   const auto cosine = static_cast<float>(std::cos(angle_rad));
   const auto sine = static_cast<float>(std::sin(angle_rad));

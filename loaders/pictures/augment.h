@@ -10,6 +10,7 @@
 
 #include "loaders/pictures/crop.h"
 #include "manifests/sample.h"
+#include "smal/body.h"
 
 namespace q3d::loaders::pictures {
 
@@ -42,8 +43,7 @@ Affine augmented_patch_from_image(const SquareBox& box, const Augmentation& augm
 
 // Rotates 3D keypoints (x, y, z) by -rotation_deg about the camera's z axis, in float32. Official code:
 // keypoint_3d_processing.
-std::array<float, manifests::kNumKeypoints * 3> rotate_keypoints_3d(
-    const std::array<float, manifests::kNumKeypoints * 3>& keypoints, double rotation_deg);
+smal::Keypoints3d rotate_keypoints_3d(const smal::Keypoints3d& keypoints, double rotation_deg);
 
 // Rotates an axis-angle orientation (rad) by -rotation_deg about the camera's z axis. The angle of the result
 // lies in [0, pi], also for rotation 0. Official code: rot_aa.

@@ -7,10 +7,11 @@
 
 #include "loaders/pictures/affine.h"
 #include "manifests/sample.h"
+#include "smal/camera.h"
 
 namespace q3d::loaders::pictures {
 
-inline constexpr int kPatchSidePx = 256;
+inline constexpr int kPatchSidePx = smal::kCropSidePx;
 
 // Mean and standard deviation of ImageNet's colours in [0, 1]. The network's pictures are normalised with
 // them.

@@ -11,7 +11,7 @@
 namespace q3d::pipeline::candidates {
 namespace {
 
-using Keypoints3d = std::array<float, manifests::kNumKeypoints * 3>;
+using smal::Keypoints3d;
 
 constexpr double kMmPerUnit = 1000.0;
 
@@ -85,12 +85,12 @@ BodyCheck check_bodies(const device::BodyMeshes& bodies, bool take_body,
   }
   for (std::size_t first = 0; first < chosen.size(); first += kMeshesAtOnce) {
     const auto part = std::span(chosen).subspan(first, std::min(kMeshesAtOnce, chosen.size() - first));
-    std::vector<device::BodyShape> shapes;
+    std::vector<smal::Body> posed;
     for (const std::size_t i : part) {
       const manifests::BodyTruth& truth = *records[i].truth;
-      shapes.push_back({smal::rotation_matrices(truth.pose_axis_angle), truth.betas});
+      posed.push_back({.pose = smal::rotation_matrices(truth.pose_axis_angle), .betas = truth.betas});
     }
-    const std::vector<device::BodyMesh> meshes = bodies.pose(shapes);
+    const std::vector<device::BodyMesh> meshes = bodies.pose(posed);
     for (std::size_t j = 0; j < part.size(); ++j) {
       check_one(meshes[j].keypoints_3d, take_body, records[part[j]], check.findings[part[j]], check);
     }

@@ -11,6 +11,7 @@
 #include "manifests/atomic_file.h"
 #include "manifests/record_json.h"
 #include "pipeline/dataset/published_dataset.h"
+#include "smal/numbers.h"
 
 namespace q3d::pipeline::dataset {
 namespace {
@@ -49,10 +50,10 @@ ordered_json describe_whole(const fs::path& shard, const manifests::ShardSample&
         {"from_image", sample.crop_from_image}}},
       {"has",
        {{"pose", sample.has_pose}, {"betas", sample.has_betas}, {"keypoints_3d", sample.has_keypoints_3d}}},
-      {"camera", sample.camera},
-      {"trans", sample.trans},
-      {"betas", sample.betas},
-      {"pose", sample.pose},
+      {"camera", smal::numbers_of(sample.body.camera)},
+      {"trans", sample.body.translation},
+      {"betas", sample.body.betas},
+      {"pose", sample.body.pose},
       {"keypoints_3d", sample.keypoints_3d},
       {"projected_2d", sample.projected_2d},
       {"record", record}};

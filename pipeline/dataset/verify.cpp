@@ -22,6 +22,7 @@
 #include "pipeline/run/progress.h"
 #include "pipeline/unit/annotated_body.h"
 #include "pipeline/unit/crop_keypoints.h"
+#include "smal/camera.h"
 
 namespace q3d::pipeline::dataset {
 namespace {
@@ -32,7 +33,6 @@ namespace fs = std::filesystem;
 // larger ones by as much of them.
 constexpr double kProjectionTolerance = 1e-4;
 constexpr float kRotationTolerance = 1e-5F;
-constexpr double kFocalInCropUnits = 1000.0 / 256.0;
 
 class Verifier {
  public:
@@ -135,9 +135,9 @@ class Verifier {
     const bool is_equal =
         truth && truth->has_pose == sample.has_pose && truth->has_betas == sample.has_betas &&
         truth->has_keypoints_3d == sample.has_keypoints_3d &&
-        std::equal(body.rotations.begin(), body.rotations.end(), sample.pose.begin(),
+        std::equal(body.pose.begin(), body.pose.end(), sample.body.pose.begin(),
                    [](float a, float b) { return std::abs(a - b) <= kRotationTolerance; }) &&
-        body.betas == sample.betas && body.translation == sample.trans &&
+        body.betas == sample.body.betas && body.translation == sample.body.translation &&
         body.keypoints_3d == sample.keypoints_3d &&
         unit::has_projection(body.keypoints_2d) == unit::has_projection(sample.projected_2d);
     if (is_equal) return;
@@ -150,10 +150,10 @@ class Verifier {
     double worst = 0.0;  // relative for what lies far outside the crop
     for (int k = 0; k < manifests::kNumKeypoints; ++k) {
       const auto at = static_cast<std::size_t>(k);
-      const double z = double{sample.keypoints_3d[3 * at + 2]} + sample.trans[2];
+      const double z = double{sample.keypoints_3d[3 * at + 2]} + sample.body.translation[2];
       for (std::size_t axis = 0; axis < 2; ++axis) {
-        const double point = double{sample.keypoints_3d[3 * at + axis]} + sample.trans[axis];
-        const double projected = kFocalInCropUnits * point / z;
+        const double point = double{sample.keypoints_3d[3 * at + axis]} + sample.body.translation[axis];
+        const double projected = smal::kFocalInCropUnits * point / z;
         const double difference =
             std::abs(projected - sample.projected_2d[2 * at + axis]) / std::max(1.0, std::abs(projected));
         worst =

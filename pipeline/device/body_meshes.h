@@ -10,28 +10,22 @@
 #include <vector>
 
 #include "filters/guard_measures.h"
-#include "manifests/sample.h"
+#include "smal/body.h"
 
 namespace q3d::pipeline::device {
 
-// What determines a body up to its place: rotations are row-major 3x3 matrices, joint 0 is the global
-// orientation.
-struct BodyShape {
-  std::array<float, manifests::kNumJoints * 9> rotations{};
-  std::array<float, manifests::kNumBetas> betas{};
-};
-
 struct BodyMesh {
-  std::vector<float> vertices;                                     // V x 3, SMAL units
-  std::array<float, manifests::kNumKeypoints * 3> keypoints_3d{};  // 26 x 3, SMAL units
-  std::array<float, manifests::kNumJoints * 3> joints{};           // 35 x 3, SMAL units
+  std::vector<float> vertices;  // V x 3, SMAL units
+  smal::Keypoints3d keypoints_3d{};
+  std::array<float, smal::kNumJoints * 3> joints{};  // 35 x 3, SMAL units
 };
 
 // The numbers of a file of priors (model/priors.h).
 struct PriorNumbers {
   filters::PosePrior pose;
-  std::vector<std::array<float, manifests::kNumBetas>> family_betas;  // the families' mean shapes
+  std::vector<smal::Betas> family_betas;  // the families' mean shapes
 };
+
 // A loaded body model. Runs on the CPU, in float32, with as many threads as the calling thread has been
 // given. pipeline/network makes one.
 class BodyMeshes {
@@ -44,8 +38,8 @@ class BodyMeshes {
   // Triangles of every mesh: three vertices each.
   virtual std::vector<std::array<std::int32_t, 3>> faces() const = 0;
 
-  // Meshes of the bodies, without translation.
-  virtual std::vector<BodyMesh> pose(std::span<const BodyShape> bodies) const = 0;
+  // Returns the meshes of the bodies from their poses and betas. Their translations are not added.
+  virtual std::vector<BodyMesh> pose(std::span<const smal::Body> bodies) const = 0;
 };
 
 // Loads the body model of an asset file. Throws std::runtime_error naming file and tensor.

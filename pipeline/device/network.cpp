@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "smal/numbers.h"
+
 namespace q3d::pipeline::device {
 namespace {
 
@@ -14,7 +16,7 @@ bool all_finite(const T& values) {
 }  // namespace
 
 bool is_finite(const BodyPrediction& body) {
-  return all_finite(body.rotations) && all_finite(body.betas) && all_finite(body.camera) &&
+  return all_finite(body.pose) && all_finite(body.betas) && all_finite(smal::numbers_of(body.camera)) &&
          all_finite(body.translation) && all_finite(body.keypoints_3d) && all_finite(body.keypoints_2d) &&
          all_finite(body.aux_keypoints_2d);
 }

@@ -9,17 +9,13 @@
 
 #include "filters/keypoint_choice.h"
 #include "manifests/sample.h"
+#include "smal/body.h"
 
 namespace q3d::pipeline::device {
 
-// One body as the network sees it. Rotations are row-major 3x3 matrices, joint 0 is the global orientation;
-// keypoints_2d are in crop units, everything in 3D in the crop camera's frame and SMAL units.
-struct BodyPrediction {
-  std::array<float, manifests::kNumJoints * 9> rotations{};
-  std::array<float, manifests::kNumBetas> betas{};
-  std::array<float, 3> camera{};
-  std::array<float, 3> translation{};
-  std::array<float, manifests::kNumKeypoints * 3> keypoints_3d{};
+// A body and its keypoints as the network gives them. The 2D keypoints are in crop units.
+struct BodyPrediction : smal::Body {
+  smal::Keypoints3d keypoints_3d{};
   std::array<float, manifests::kNumKeypoints * 2> keypoints_2d{};
   std::array<float, manifests::kNumKeypoints * 2> aux_keypoints_2d{};
 };

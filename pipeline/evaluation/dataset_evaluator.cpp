@@ -155,14 +155,14 @@ class RecordEvaluator {
 
   void measure_setting(std::size_t setting, std::span<const device::BodyPrediction> bodies,
                        const Measurable& unit) {
-    std::vector<device::BodyShape> shapes;
+    std::vector<smal::Body> posing;
     std::vector<std::size_t> with_mesh;
     for (std::size_t j = 0; j < bodies.size(); ++j) {
       if (unit.targets[j].vertices.empty()) continue;
-      shapes.push_back({bodies[j].rotations, bodies[j].betas});
+      posing.push_back(bodies[j]);
       with_mesh.push_back(j);
     }
-    const std::vector<device::BodyMesh> posed = instruments_.meshes->pose(shapes);
+    const std::vector<device::BodyMesh> posed = instruments_.meshes->pose(posing);
     std::vector<const device::BodyMesh*> mesh_of(bodies.size(), nullptr);
     for (std::size_t m = 0; m < posed.size(); ++m) mesh_of[with_mesh[m]] = &posed[m];
     for (std::size_t j = 0; j < bodies.size(); ++j) {

@@ -148,8 +148,8 @@ class LabelMeasurer {
     MeasuredBody measured;
     std::vector<device::BodyMesh> mesh;
     if (!target.vertices.empty()) {
-      const device::BodyShape shape{body.rotations, body.betas};
-      mesh = meshes_.pose(std::span(&shape, 1));
+      const smal::Body& posed = body;
+      mesh = meshes_.pose(std::span(&posed, 1));
     }
     measured.annotated = measure(body, mesh.empty() ? nullptr : &mesh.front(), target);
     if (projected) measured.projected = measure(body, nullptr, *projected);

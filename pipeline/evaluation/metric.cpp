@@ -69,12 +69,12 @@ MetricValues measure(const device::BodyPrediction& body, const device::BodyMesh*
 
 void add_true_meshes(std::span<const manifests::SampleRecord* const> records,
                      const device::BodyMeshes& meshes, std::span<Target> targets) {
-  std::vector<device::BodyShape> bodies;
+  std::vector<smal::Body> bodies;
   std::vector<std::size_t> positions;
   for (std::size_t i = 0; i < records.size(); ++i) {
     const auto& truth = records[i]->truth;
     if (!truth || !truth->has_pose || !truth->has_betas) continue;
-    bodies.push_back({smal::rotation_matrices(truth->pose_axis_angle), truth->betas});
+    bodies.push_back({.pose = smal::rotation_matrices(truth->pose_axis_angle), .betas = truth->betas});
     positions.push_back(i);
   }
   std::vector<device::BodyMesh> posed = meshes.pose(bodies);

@@ -44,10 +44,10 @@ MetricMean mean_of(std::span<const MetricValues* const> samples, std::size_t met
 
 // What a prediction is measured against.
 struct Target {
-  device::CropKeypoints keypoints{};  // annotated, crop units and weight
-  double normaliser_px = 256.0;       // sqrt(mask area) of the 256-px crop, or 256 for the whole crop
+  device::CropKeypoints keypoints{};         // annotated, crop units and weight
+  double normaliser_px = smal::kCropSidePx;  // sqrt(mask area) of the 256-px crop, or 256 for the whole crop
   bool normalised_by_mask = false;
-  std::optional<std::array<float, manifests::kNumKeypoints * 3>> keypoints_3d;  // SMAL units
+  std::optional<smal::Keypoints3d> keypoints_3d;
   std::vector<float> vertices;  // V x 3, SMAL units; empty when the true mesh is not known
 };
 

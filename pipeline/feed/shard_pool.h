@@ -26,9 +26,9 @@ struct TrainingSample {
   bool has_pose = false;
   bool has_betas = false;
   bool has_keypoints_3d = false;
-  std::array<float, manifests::kNumJoints * 9> pose{};
-  std::array<float, manifests::kNumBetas> betas{};
-  std::array<float, manifests::kNumKeypoints * 3> keypoints_3d{};
+  smal::Pose pose{};
+  smal::Betas betas{};
+  smal::Keypoints3d keypoints_3d{};
 };
 
 // Reads take no lock and may run in many threads.

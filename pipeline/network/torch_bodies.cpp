@@ -38,7 +38,7 @@ class TorchBodyMeshes : public device::BodyMeshes {
  public:
   explicit TorchBodyMeshes(smal::tensors::SmalAsset asset) : body_(std::move(asset)) {}
   std::vector<std::array<std::int32_t, 3>> faces() const override;
-  std::vector<device::BodyMesh> pose(std::span<const device::BodyShape> bodies) const override;
+  std::vector<device::BodyMesh> pose(std::span<const smal::Body> bodies) const override;
 
  private:
   smal::tensors::SmalBody body_;
@@ -55,19 +55,19 @@ std::vector<std::array<std::int32_t, 3>> TorchBodyMeshes::faces() const {
   return triangles;
 }
 
-std::vector<device::BodyMesh> TorchBodyMeshes::pose(std::span<const device::BodyShape> bodies) const {
+std::vector<device::BodyMesh> TorchBodyMeshes::pose(std::span<const smal::Body> bodies) const {
   const torch::NoGradGuard no_gradients;
   std::vector<device::BodyMesh> meshes;
   meshes.reserve(bodies.size());
   for (std::size_t first = 0; first < bodies.size(); first += kBatch) {
     const auto batch = bodies.subspan(first, std::min(kBatch, bodies.size() - first));
     const auto count = static_cast<std::int64_t>(batch.size());
-    torch::Tensor rotations = torch::empty({count, manifests::kNumJoints, 3, 3}, torch::kFloat32);
-    torch::Tensor betas = torch::empty({count, manifests::kNumBetas}, torch::kFloat32);
+    torch::Tensor rotations = torch::empty({count, smal::kNumJoints, 3, 3}, torch::kFloat32);
+    torch::Tensor betas = torch::empty({count, smal::kNumBetas}, torch::kFloat32);
     float* rotation = rotations.data_ptr<float>();
     float* beta = betas.data_ptr<float>();
-    for (const device::BodyShape& body : batch) {
-      rotation = std::copy(body.rotations.begin(), body.rotations.end(), rotation);
+    for (const smal::Body& body : batch) {
+      rotation = std::copy(body.pose.begin(), body.pose.end(), rotation);
       beta = std::copy(body.betas.begin(), body.betas.end(), beta);
     }
     for (device::BodyMesh& mesh : to_meshes(body_.forward(rotations, betas)))

@@ -14,17 +14,21 @@
 #include "model/priors.h"
 #include "model/tta.h"
 #include "pipeline/run/errors.h"
+#include "smal/numbers.h"
 
 namespace q3d::pipeline::network {
 namespace {
 
 constexpr std::int64_t kSide = loaders::pictures::kPatchSidePx;
 
-template <std::size_t N>
-void copy_row(const torch::Tensor& batch, std::int64_t row, std::array<float, N>& into) {
+template <typename Value>
+void copy_row(const torch::Tensor& batch, std::int64_t row, Value& into) {
+  smal::NumbersOf<Value> numbers;
   const torch::Tensor flat = batch[row].flatten();
-  TORCH_CHECK(flat.numel() == static_cast<std::int64_t>(N), "prediction row has ", flat.numel(), " numbers");
-  std::copy_n(flat.data_ptr<float>(), N, into.begin());
+  TORCH_CHECK(flat.numel() == static_cast<std::int64_t>(numbers.size()), "prediction row has ", flat.numel(),
+              " numbers");
+  std::copy_n(flat.data_ptr<float>(), numbers.size(), numbers.begin());
+  into = smal::from_numbers<Value>(numbers);
 }
 
 torch::Tensor on_host(const torch::Tensor& tensor) {
@@ -42,7 +46,7 @@ void append_rows(const model::Prediction& batch, std::vector<device::BodyPredict
   const torch::Tensor aux_keypoints_2d = on_host(batch.aux_keypoints_2d);
   for (std::int64_t i = 0; i < rotations.size(0); ++i) {
     device::BodyPrediction& row = rows.emplace_back();
-    copy_row(rotations, i, row.rotations);
+    copy_row(rotations, i, row.pose);
     copy_row(betas, i, row.betas);
     copy_row(camera, i, row.camera);
     copy_row(translation, i, row.translation);

@@ -8,11 +8,11 @@
 #include <utility>
 
 #include "loaders/pictures/crop.h"
+#include "smal/camera.h"
 
 namespace q3d::pipeline::render {
 namespace {
 
-constexpr double kFocalPx = 1000.0;
 constexpr double kNearestDepth = 1e-3;  // SMAL units
 
 struct Point {
@@ -77,15 +77,16 @@ std::vector<std::uint8_t> fill_triangles(std::span<const float> points,
 std::vector<std::uint8_t> crop_silhouette(std::span<const float> vertices,
                                           const std::array<float, 3>& translation,
                                           std::span<const std::array<std::int32_t, 3>> faces) {
-  constexpr int kSide = loaders::pictures::kPatchSidePx;
+  constexpr int kSide = smal::kCropSidePx;
   std::vector<float> points;
   points.reserve(vertices.size() / 3 * 2);
   for (std::size_t v = 0; v + 2 < vertices.size(); v += 3) {
     const double depth = double{vertices[v + 2]} + translation[2];
     for (std::size_t axis = 0; axis < 2; ++axis) {
       const double point = double{vertices[v + axis]} + translation[axis];
-      points.push_back(depth < kNearestDepth ? std::numeric_limits<float>::quiet_NaN()
-                                             : static_cast<float>(kFocalPx * point / depth + kSide / 2));
+      points.push_back(depth < kNearestDepth
+                           ? std::numeric_limits<float>::quiet_NaN()
+                           : static_cast<float>(smal::kFocalPx * point / depth + kSide / 2));
     }
   }
   return fill_triangles(points, faces, kSide);

@@ -31,6 +31,8 @@
 #include "pipeline/training/rank_agreement.h"
 #include "pipeline/training/training_log.h"
 #include "pipeline/training/training_state.h"
+#include "smal/camera.h"
+#include "smal/sizes.h"
 #include "smal/tensors/asset.h"
 #include "smal/tensors/body.h"
 
@@ -85,12 +87,12 @@ model::TrainingBatch to_tensors(feed::FeedBatch&& from) {
         data, shape, [batch](void*) {}, dtype);
   };
   model::TrainingBatch result;
-  result.images = view(batch->images.get(), {3, 256, 256}, torch::kFloat32);
+  result.images = view(batch->images.get(), {3, smal::kCropSidePx, smal::kCropSidePx}, torch::kFloat32);
   model::Targets& targets = result.targets;
-  targets.keypoints_2d = view(batch->keypoints_2d.data(), {26, 3}, torch::kFloat32);
-  targets.keypoints_3d = view(batch->keypoints_3d.data(), {26, 4}, torch::kFloat32);
-  targets.rotations = view(batch->rotations.data(), {35, 3, 3}, torch::kFloat32);
-  targets.betas = view(batch->betas.data(), {41}, torch::kFloat32);
+  targets.keypoints_2d = view(batch->keypoints_2d.data(), {smal::kNumKeypoints, 3}, torch::kFloat32);
+  targets.keypoints_3d = view(batch->keypoints_3d.data(), {smal::kNumKeypoints, 4}, torch::kFloat32);
+  targets.rotations = view(batch->rotations.data(), {smal::kNumJoints, 3, 3}, torch::kFloat32);
+  targets.betas = view(batch->betas.data(), {smal::kNumBetas}, torch::kFloat32);
   targets.has_pose = view(batch->has_pose.data(), {}, torch::kFloat32);
   targets.has_betas = view(batch->has_betas.data(), {}, torch::kFloat32);
   targets.family = view(batch->family.data(), {}, torch::kInt64);

@@ -3,15 +3,12 @@
 #include <cmath>
 #include <limits>
 
-#include "loaders/pictures/crop.h"
 #include "smal/axis_angle.h"
 
 namespace q3d::pipeline::unit {
 namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-constexpr double kFocalPx = 1000.0;  // of the 256-px crop; smal/tensors/camera.h has it too, beside LibTorch
-constexpr double kSidePx = loaders::pictures::kPatchSidePx;
 
 bool is_before_camera(const manifests::BodyTruth& truth) {
   for (std::size_t k = 0; k < manifests::kNumKeypoints; ++k) {
@@ -25,7 +22,7 @@ void project(device::BodyPrediction& body) {
     const double depth = double{body.keypoints_3d[3 * k + 2]} + body.translation[2];
     for (std::size_t axis = 0; axis < 2; ++axis) {
       const double point = double{body.keypoints_3d[3 * k + axis]} + body.translation[axis];
-      body.keypoints_2d[2 * k + axis] = static_cast<float>(kFocalPx / kSidePx * point / depth);
+      body.keypoints_2d[2 * k + axis] = static_cast<float>(smal::kFocalInCropUnits * point / depth);
     }
   }
 }
@@ -34,20 +31,20 @@ void project(device::BodyPrediction& body) {
 
 device::BodyPrediction no_body() {
   device::BodyPrediction body;
-  body.camera.fill(kNaN);
+  body.camera = {kNaN, kNaN, kNaN};
   body.keypoints_2d.fill(kNaN);
   return body;
 }
 
 device::BodyPrediction annotated_body(const manifests::BodyTruth& truth) {
   device::BodyPrediction body = no_body();
-  body.rotations = smal::rotation_matrices(truth.pose_axis_angle);
+  body.pose = smal::rotation_matrices(truth.pose_axis_angle);
   body.betas = truth.betas;
   body.translation = truth.trans;
   body.keypoints_3d = truth.keypoints_3d;
   if (truth.trans[2] < kNearestDepth) return body;
-  body.camera = {static_cast<float>(2.0 * kFocalPx / (kSidePx * truth.trans[2])), truth.trans[0],
-                 truth.trans[1]};
+  body.camera = {static_cast<float>(2.0 * smal::kFocalPx / (double{smal::kCropSidePx} * truth.trans[2])),
+                 truth.trans[0], truth.trans[1]};
   if (truth.has_keypoints_3d && is_before_camera(truth)) project(body);
   return body;
 }

@@ -17,12 +17,12 @@ using manifests::Verdict;
 
 // Of the families' mean bodies, in the pose of the template: bones keep their lengths in any other.
 filters::LimbRange family_limbs(const device::PriorNumbers& priors, const device::BodyMeshes& meshes) {
-  std::vector<device::BodyShape> shapes;
+  std::vector<smal::Body> bodies;
   for (const auto& betas : priors.family_betas) {
-    shapes.push_back({smal::rotation_matrices({}), betas});
+    bodies.push_back({.pose = smal::rotation_matrices({}), .betas = betas});
   }
   std::vector<std::array<double, 12>> limbs;
-  for (const device::BodyMesh& mesh : meshes.pose(shapes)) {
+  for (const device::BodyMesh& mesh : meshes.pose(bodies)) {
     limbs.push_back(filters::relative_limb_lengths(mesh.joints));
   }
   return filters::limb_range(limbs);
@@ -76,7 +76,7 @@ filters::LabelMeasures LabelMeasurer::measure_one(const device::CropKeypoints& k
   if (guards_.left_right_max > 0.0) {
     measures.left_right = filters::left_right_ratio(body.keypoints_2d, keypoints, kMirror);
   }
-  if (pose_prior_) measures.pose_deviation = filters::pose_deviation(body.rotations, *pose_prior_);
+  if (pose_prior_) measures.pose_deviation = filters::pose_deviation(body.pose, *pose_prior_);
   if (limb_range_) {
     measures.limb_factor = filters::limb_factor(filters::relative_limb_lengths(mesh->joints), *limb_range_);
   }
@@ -91,9 +91,9 @@ std::vector<MeasuredLabel> LabelMeasurer::measure(const UnitWork& work) const {
   const std::vector<Label> labels = kept_labels(work);
   std::vector<device::BodyMesh> meshes;
   if (meshes_) {
-    std::vector<device::BodyShape> shapes;
-    for (const Label& label : labels) shapes.push_back({label.body->rotations, label.body->betas});
-    meshes = meshes_->pose(shapes);
+    std::vector<smal::Body> bodies;
+    for (const Label& label : labels) bodies.push_back(*label.body);
+    meshes = meshes_->pose(bodies);
   }
   std::vector<MeasuredLabel> measured(labels.size());
   tbb::parallel_for(std::size_t{0}, labels.size(), [&](std::size_t i) {

@@ -18,10 +18,7 @@ void set_label(ShardSample& sample, const device::BodyPrediction& body) {
   sample.has_pose = has_body && (!is_truth || sample.record.truth->has_pose);
   sample.has_betas = has_body && (!is_truth || sample.record.truth->has_betas);
   sample.has_keypoints_3d = has_body && (!is_truth || sample.record.truth->has_keypoints_3d);
-  sample.pose = body.rotations;
-  sample.betas = body.betas;
-  sample.camera = body.camera;
-  sample.trans = body.translation;
+  sample.body = static_cast<const smal::Body&>(body);
   sample.keypoints_3d = body.keypoints_3d;
   sample.projected_2d = body.keypoints_2d;
 }

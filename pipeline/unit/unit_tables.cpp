@@ -6,42 +6,45 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "smal/numbers.h"
+
 namespace q3d::pipeline::unit {
 namespace {
 
 using manifests::Table;
 
-// One array member of every row, end to end.
-template <typename Row, std::size_t N>
+// One member of every row's body, end to end.
+template <typename Row, typename Part, typename Value>
 void add_field(Table& table, const std::string& name, const std::vector<Row>& rows,
-               std::vector<std::int64_t> row_shape, std::array<float, N> device::BodyPrediction::*field) {
+               std::vector<std::int64_t> row_shape, Value Part::*field) {
   std::vector<float> values;
-  values.reserve(rows.size() * N);
+  values.reserve(rows.size() * smal::NumbersOf<Value>().size());
   for (const Row& row : rows) {
-    const auto& source = row.body.*field;
-    values.insert(values.end(), source.begin(), source.end());
+    const smal::NumbersOf<Value> numbers = smal::numbers_of(row.body.*field);
+    values.insert(values.end(), numbers.begin(), numbers.end());
   }
   table.add<float>(name, std::move(row_shape), values);
 }
 
-template <typename Row, std::size_t N>
-void read_field(const Table& table, const std::string& name, std::vector<Row>& rows,
-                std::array<float, N> device::BodyPrediction::*field) {
+template <typename Row, typename Part, typename Value>
+void read_field(const Table& table, const std::string& name, std::vector<Row>& rows, Value Part::*field) {
+  smal::NumbersOf<Value> numbers;
   const std::span<const float> values = table.column<float>(name);
-  if (values.size() != rows.size() * N) {
+  if (values.size() != rows.size() * numbers.size()) {
     throw std::runtime_error(fmt::format("column {} holds {} numbers, expected {} rows of {}", name,
-                                         values.size(), rows.size(), N));
+                                         values.size(), rows.size(), numbers.size()));
   }
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(i * N), N, (rows[i].body.*field).begin());
+    std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(i * numbers.size()), numbers.size(),
+                numbers.begin());
+    rows[i].body.*field = smal::from_numbers<Value>(numbers);
   }
 }
 
 // The fields of a body, named once for writing and reading.
 template <typename Visitor>
 void visit_body(Visitor&& visit) {
-  visit("rotations", std::vector<std::int64_t>{manifests::kNumJoints, 3, 3},
-        &device::BodyPrediction::rotations);
+  visit("rotations", std::vector<std::int64_t>{manifests::kNumJoints, 3, 3}, &device::BodyPrediction::pose);
   visit("betas", std::vector<std::int64_t>{manifests::kNumBetas}, &device::BodyPrediction::betas);
   visit("camera", std::vector<std::int64_t>{3}, &device::BodyPrediction::camera);
   visit("translation", std::vector<std::int64_t>{3}, &device::BodyPrediction::translation);

@@ -17,7 +17,7 @@ RestMesh rest_of(const smal::tensors::SmalAsset& asset) {
   for (std::int64_t v = 0; v < vertices.size(0); ++v) {
     rest.vertices.emplace_back(vertices[v][0], vertices[v][1], vertices[v][2]);
     auto& row = rest.skinning.emplace_back();
-    for (std::int64_t joint = 0; joint < kBodyJoints; ++joint) {
+    for (std::int64_t joint = 0; joint < smal::kNumJoints; ++joint) {
       row[static_cast<std::size_t>(joint)] = weights[v][joint];
     }
   }
@@ -36,11 +36,12 @@ ShapeSpace shapes_of(const RestMesh& rest, const smal::tensors::SmalAsset& asset
   using RowMajor = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   const auto directions = asset.shapedirs.contiguous();
   const animal::ShapeSpace& space = animal::synthetic_shape_space();
-  return {rest,
-          Eigen::Map<const RowMajor>(directions.const_data_ptr<float>(), 3 * directions.size(0), kBodyBetas)
-              .cast<double>(),
-          space.family_means,
-          {space.family_factors.begin(), space.family_factors.end()}};
+  return {
+      rest,
+      Eigen::Map<const RowMajor>(directions.const_data_ptr<float>(), 3 * directions.size(0), smal::kNumBetas)
+          .cast<double>(),
+      space.family_means,
+      {space.family_factors.begin(), space.family_factors.end()}};
 }
 
 }  // namespace
@@ -70,12 +71,14 @@ void BodyModel::save(const std::filesystem::path& asset) const {
 std::vector<Body> BodyModel::pose(std::span<const Posture> postures) const {
   const torch::InferenceMode no_gradient;
   const auto count = static_cast<std::int64_t>(postures.size());
-  auto pose = torch::empty({count, kBodyJoints, 3});
-  auto betas = torch::empty({count, kBodyBetas});
+  auto pose = torch::empty({count, smal::kNumJoints, 3});
+  auto betas = torch::empty({count, smal::kNumBetas});
   for (std::int64_t i = 0; i < count; ++i) {
     const Posture& posture = postures[static_cast<std::size_t>(i)];
-    std::copy(posture.pose.begin(), posture.pose.end(), pose.mutable_data_ptr<float>() + i * 3 * kBodyJoints);
-    std::copy(posture.betas.begin(), posture.betas.end(), betas.mutable_data_ptr<float>() + i * kBodyBetas);
+    std::copy(posture.pose.begin(), posture.pose.end(),
+              pose.mutable_data_ptr<float>() + i * 3 * smal::kNumJoints);
+    std::copy(posture.betas.begin(), posture.betas.end(),
+              betas.mutable_data_ptr<float>() + i * smal::kNumBetas);
   }
   const auto output = model_->body.forward(smal::tensors::axis_angle_to_matrix_exact(pose), betas);
   const auto vertices = output.vertices.contiguous();
@@ -85,9 +88,9 @@ std::vector<Body> BodyModel::pose(std::span<const Posture> postures) const {
   std::vector<Body> bodies(postures.size());
   for (Body& body : bodies) {
     body.vertices.assign(vertex, vertex + vertices.size(1));
-    std::copy(keypoint, keypoint + kBodyKeypoints, body.keypoints.begin());
+    std::copy(keypoint, keypoint + smal::kNumKeypoints, body.keypoints.begin());
     vertex += vertices.size(1);
-    keypoint += kBodyKeypoints;
+    keypoint += smal::kNumKeypoints;
   }
   return bodies;
 }

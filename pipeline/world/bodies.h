@@ -9,32 +9,29 @@
 #include <vector>
 
 #include "pipeline/render/rays.h"
+#include "smal/sizes.h"
 
 namespace q3d::pipeline::world {
-
-inline constexpr int kBodyKeypoints = 26;
-inline constexpr int kBodyJoints = 35;
-inline constexpr int kBodyBetas = 41;
 
 // What the network is to find: SMAL's pose (axis-angle, rad; the first three are the global orientation) and
 // shape.
 struct Posture {
-  std::array<float, 3 * kBodyJoints> pose{};
-  std::array<float, kBodyBetas> betas{};
+  std::array<float, 3 * smal::kNumJoints> pose{};
+  std::array<float, smal::kNumBetas> betas{};
 };
 
 // A posed body, SMAL units, turned into the camera's frame but not moved: add the translation to see it.
 struct Body {
   std::vector<Eigen::Vector3f> vertices;
-  std::array<Eigen::Vector3f, kBodyKeypoints> keypoints;
+  std::array<Eigen::Vector3f, smal::kNumKeypoints> keypoints;
 };
 
 // The mesh at rest: x to the head, y up, z to the animal's right.
 struct RestMesh {
   std::vector<Eigen::Vector3f> vertices;
   std::vector<render::Triangle> triangles;
-  std::vector<std::array<float, kBodyJoints>> skinning;  // weights of each vertex, sum 1
-  std::array<std::vector<int>, kBodyKeypoints> keypoint_vertices;
+  std::vector<std::array<float, smal::kNumJoints>> skinning;  // weights of each vertex, sum 1
+  std::array<std::vector<int>, smal::kNumKeypoints> keypoint_vertices;
 };
 
 class ShapeSpace;

@@ -23,7 +23,7 @@ constexpr JointRange kNeck[] = {{15, 15}};
 enum Keypoint { left_eye = 0, right_eye = 1, left_mouth = 22, right_mouth = 23, nose = 24 };
 
 template <std::size_t N>
-float share(const std::array<float, kBodyJoints>& skinning, const JointRange (&parts)[N]) {
+float share(const std::array<float, smal::kNumJoints>& skinning, const JointRange (&parts)[N]) {
   float sum = 0.0F;
   for (const JointRange& part : parts) {
     for (int joint = part.first; joint <= part.last; ++joint)

@@ -6,11 +6,11 @@
 #include <stdexcept>
 #include <string>
 
+#include "smal/camera.h"
+
 namespace q3d::pipeline::world {
 namespace {
 
-constexpr double kCropSidePx = 256.0;
-constexpr double kCropFocalPx = 1000.0;
 constexpr int kMinBoxPx = 24;
 
 struct Extent {
@@ -106,7 +106,7 @@ PictureCamera camera_of_box(const cv::Rect& box) {
                                 std::to_string(box.height) + " px");
   }
   // Official code: the datasets' centre is (2 x + w) // 2, the crop's side is the box's longer one.
-  return {kCropFocalPx * std::max(box.width, box.height) / kCropSidePx,
+  return {smal::kFocalPx * std::max(box.width, box.height) / smal::kCropSidePx,
           std::floor((2.0 * box.x + box.width) / 2.0), std::floor((2.0 * box.y + box.height) / 2.0)};
 }
 

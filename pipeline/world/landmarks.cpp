@@ -12,32 +12,32 @@ namespace q3d::pipeline::world {
 namespace {
 
 // SMAL's 26, by the names that the tables below use.
-constexpr std::array<std::string_view, kBodyKeypoints> kBodyNames{"left_eye",
-                                                                  "right_eye",
-                                                                  "chin",
-                                                                  "left_front_paw",
-                                                                  "right_front_paw",
-                                                                  "left_back_paw",
-                                                                  "right_back_paw",
-                                                                  "tail_base",
-                                                                  "left_front_thigh",
-                                                                  "right_front_thigh",
-                                                                  "left_back_thigh",
-                                                                  "right_back_thigh",
-                                                                  "left_shoulder",
-                                                                  "right_shoulder",
-                                                                  "left_front_knee",
-                                                                  "right_front_knee",
-                                                                  "left_back_knee",
-                                                                  "right_back_knee",
-                                                                  "neck",
-                                                                  "tail_tip",
-                                                                  "left_ear",
-                                                                  "right_ear",
-                                                                  "left_mouth_corner",
-                                                                  "right_mouth_corner",
-                                                                  "nose",
-                                                                  "tail_mid"};
+constexpr std::array<std::string_view, smal::kNumKeypoints> kBodyNames{"left_eye",
+                                                                       "right_eye",
+                                                                       "chin",
+                                                                       "left_front_paw",
+                                                                       "right_front_paw",
+                                                                       "left_back_paw",
+                                                                       "right_back_paw",
+                                                                       "tail_base",
+                                                                       "left_front_thigh",
+                                                                       "right_front_thigh",
+                                                                       "left_back_thigh",
+                                                                       "right_back_thigh",
+                                                                       "left_shoulder",
+                                                                       "right_shoulder",
+                                                                       "left_front_knee",
+                                                                       "right_front_knee",
+                                                                       "left_back_knee",
+                                                                       "right_back_knee",
+                                                                       "neck",
+                                                                       "tail_tip",
+                                                                       "left_ear",
+                                                                       "right_ear",
+                                                                       "left_mouth_corner",
+                                                                       "right_mouth_corner",
+                                                                       "nose",
+                                                                       "tail_mid"};
 
 struct NamedPlace {
   std::string_view name;   // the dataset's
@@ -238,7 +238,7 @@ class SurfacePlaces {
   }
 
   const RestMesh& rest_;
-  std::array<Eigen::Vector3f, kBodyKeypoints> keypoints_;
+  std::array<Eigen::Vector3f, smal::kNumKeypoints> keypoints_;
   std::map<std::string, int> vertex_;
 };
 

@@ -22,9 +22,9 @@ struct PictureTruth {
   cv::Size size_px;
   Framing framing;  // box, camera and translation
   Posture posture;
-  std::array<Eigen::Vector3f, kBodyKeypoints> keypoints_3d;  // camera frame, without the translation
-  std::array<SeenLandmark, kBodyKeypoints> keypoints;        // SMAL's 26, exact
-  std::vector<Label> labels;                                 // the set's own keypoints, as annotated
+  std::array<Eigen::Vector3f, smal::kNumKeypoints> keypoints_3d;  // camera frame, without the translation
+  std::array<SeenLandmark, smal::kNumKeypoints> keypoints;        // SMAL's 26, exact
+  std::vector<Label> labels;                                      // the set's own keypoints, as annotated
 };
 
 struct Picture {

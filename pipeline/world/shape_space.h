@@ -23,7 +23,7 @@ class ShapeSpace {
   Eigen::VectorXd typical(const Species& species) const;
 
   // An individual: about the typical one, at half the family's deviations.
-  std::array<float, kBodyBetas> draw(const Species& species, run::Rng& rng) const;
+  std::array<float, smal::kNumBetas> draw(const Species& species, run::Rng& rng) const;
 
  private:
   struct Length {  // of a body part: the distance of two groups of vertices

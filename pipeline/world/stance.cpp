@@ -53,7 +53,7 @@ void Posing::add_motion(double spread, bool legs) {
   std::mt19937_64 random(rng_.next());
   Eigen::VectorXd pose = kModel.mean + spread * (animal::sample_motion(kModel, random) - kModel.mean);
   pose = pose.cwiseMax(kModel.lower).cwiseMin(kModel.upper);
-  for (int joint = 1; joint < kBodyJoints; ++joint) {
+  for (int joint = 1; joint < smal::kNumJoints; ++joint) {
     if (is_leg(joint) && !legs) continue;
     for (int axis = 0; axis < 3; ++axis) turn(joint, axis, pose[3 * joint + axis] / kDegree);
   }

@@ -9,10 +9,10 @@
 namespace q3d::pipeline::world {
 
 struct Stance {
-  std::array<float, 3 * kBodyJoints> pose{};  // axis-angle, rad; the first three stay zero
-  double pitch = 0.0;                         // of the whole body, rad: nose up
-  double roll = 0.0;                          // rad: the back turns towards the animal's right
-  double lift = 0.0;                          // of the lowest point over the ground, SMAL units
+  std::array<float, 3 * smal::kNumJoints> pose{};  // axis-angle, rad; the first three stay zero
+  double pitch = 0.0;                              // of the whole body, rad: nose up
+  double roll = 0.0;                               // rad: the back turns towards the animal's right
+  double lift = 0.0;                               // of the lowest point over the ground, SMAL units
 };
 
 struct StanceHabits {

@@ -3,10 +3,9 @@
 
 #include <torch/torch.h>
 
-namespace q3d::smal::tensors {
+#include "smal/camera.h"
 
-inline constexpr double kFocalPx = 1000.0;  // quoted for the 256-px crop
-inline constexpr double kCropSidePx = 256.0;
+namespace q3d::smal::tensors {
 
 // camera (B, 3) = (s, tx, ty) -> translation (B, 3) = (tx, ty, 2 f / (256 s + 1e-9)). Official:
 // PRIMA.forward_step.

@@ -49,10 +49,11 @@ void expect_arrays(const ShardSample& sample, int row) {
   expect_ramp("keypoints_px", xy_px, 2 + above);
   expect_ramp("crop_from_image", sample.crop_from_image, 3 + above);
   expect_ramp("patch_box_px", sample.patch_box, 4 + above);
-  expect_ramp("pose", sample.pose, 5 + above);
-  expect_ramp("betas", sample.betas, 6 + above);
-  expect_ramp("camera", sample.camera, 7 + above);
-  expect_ramp("trans", sample.trans, 8 + above);
+  expect_ramp("pose", sample.body.pose, 5 + above);
+  expect_ramp("betas", sample.body.betas, 6 + above);
+  expect_ramp("camera", std::array{sample.body.camera.s, sample.body.camera.tx, sample.body.camera.ty},
+              7 + above);
+  expect_ramp("trans", sample.body.translation, 8 + above);
   expect_ramp("keypoints_3d", sample.keypoints_3d, 9 + above);
   expect_ramp("projected_2d", sample.projected_2d, 10 + above);
 }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "manifests/shard.h"
+#include "smal/numbers.h"
 
 namespace q3d::testing {
 
@@ -65,10 +66,12 @@ inline manifests::ShardSample make_shard_sample(int row) {
 
   sample.has_pose = true;
   sample.has_keypoints_3d = row == 1;
-  fill(std::span(sample.pose), 5, row);
-  fill(std::span(sample.betas), 6, row);
-  fill(std::span(sample.camera), 7, row);
-  fill(std::span(sample.trans), 8, row);
+  fill(std::span(sample.body.pose), 5, row);
+  fill(std::span(sample.body.betas), 6, row);
+  smal::NumbersOf<smal::Camera> camera{};
+  fill(std::span(camera), 7, row);
+  sample.body.camera = smal::from_numbers<smal::Camera>(camera);
+  fill(std::span(sample.body.translation), 8, row);
   fill(std::span(sample.keypoints_3d), 9, row);
   fill(std::span(sample.projected_2d), 10, row);
   if (row == 1) {

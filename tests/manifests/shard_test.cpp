@@ -70,10 +70,10 @@ void expect_equal(const ShardSample& got, const ShardSample& expected) {
   EXPECT_EQ(got.has_pose, expected.has_pose);
   EXPECT_EQ(got.has_betas, expected.has_betas);
   EXPECT_EQ(got.has_keypoints_3d, expected.has_keypoints_3d);
-  EXPECT_EQ(got.pose, expected.pose);
-  EXPECT_EQ(got.betas, expected.betas);
-  EXPECT_EQ(got.camera, expected.camera);
-  EXPECT_EQ(got.trans, expected.trans);
+  EXPECT_EQ(got.body.pose, expected.body.pose);
+  EXPECT_EQ(got.body.betas, expected.body.betas);
+  EXPECT_EQ(got.body.camera, expected.body.camera);
+  EXPECT_EQ(got.body.translation, expected.body.translation);
   EXPECT_EQ(got.keypoints_3d, expected.keypoints_3d);
   EXPECT_EQ(got.projected_2d, expected.projected_2d);
 }

@@ -40,9 +40,8 @@ class BodyCheckTest : public testing::Test {
     truth.pose_axis_angle[1] = 0.8F;
     truth.pose_axis_angle[3 * 7 + 2] = 0.4F;
     truth.betas[0] = 1.2F;
-    const std::vector<device::BodyShape> shapes{
-        {smal::rotation_matrices(truth.pose_axis_angle), truth.betas}};
-    truth.keypoints_3d = bodies->pose(shapes).front().keypoints_3d;
+    const smal::Body body{.pose = smal::rotation_matrices(truth.pose_axis_angle), .betas = truth.betas};
+    truth.keypoints_3d = bodies->pose(std::span(&body, 1)).front().keypoints_3d;
     for (std::size_t i = 2; i < truth.keypoints_3d.size(); i += 3) truth.keypoints_3d[i] += 3.0F;
     return record;
   }

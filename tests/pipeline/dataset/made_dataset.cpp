@@ -30,8 +30,9 @@ ShardSample flat_sample(const std::string& id) {
   sample.judgement.verdict = manifests::Verdict::retained;
   sample.image_width_px = 64;
   sample.image_height_px = 48;
-  sample.camera.fill(std::numeric_limits<float>::quiet_NaN());
-  sample.projected_2d.fill(std::numeric_limits<float>::quiet_NaN());
+  constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+  sample.body.camera = {kNaN, kNaN, kNaN};
+  sample.projected_2d.fill(kNaN);
   return sample;
 }
 

@@ -14,7 +14,7 @@
 namespace q3d::pipeline::evaluation {
 namespace {
 
-constexpr double kSidePx = 256.0;
+constexpr double kSidePx = smal::kCropSidePx;
 
 double value(const MetricValues& values, Metric metric) {
   return values[index_of(metric)].value_or(std::numeric_limits<double>::quiet_NaN());
@@ -131,11 +131,11 @@ TEST(AddTrueMeshes, TheTrueBodyHasNoError) {
   ASSERT_TRUE(target.keypoints_3d.has_value()) << "the record has none, so the body gives them";
 
   device::BodyPrediction body;
-  body.rotations = smal::rotation_matrices(record.truth->pose_axis_angle);
+  body.pose = smal::rotation_matrices(record.truth->pose_axis_angle);
   body.betas = record.truth->betas;
   const auto error = [&] {
-    const device::BodyShape shape{body.rotations, body.betas};
-    const device::BodyMesh mesh = meshes->pose(std::span(&shape, 1)).front();
+    const smal::Body& posed = body;
+    const device::BodyMesh mesh = meshes->pose(std::span(&posed, 1)).front();
     body.keypoints_3d = mesh.keypoints_3d;
     return measure(body, &mesh, target);
   };

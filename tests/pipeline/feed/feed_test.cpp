@@ -131,8 +131,8 @@ TEST_F(FeedTest, WithoutAugmentationItIsThePlainCrop) {
     EXPECT_EQ(batch.keypoints_3d[4 * i], sample.keypoints_3d[3 * i]);
     EXPECT_EQ(batch.keypoints_3d[4 * i + 3], 1.0F);
   }
-  EXPECT_TRUE(std::equal(sample.pose.begin(), sample.pose.end(), batch.rotations.begin()));
-  EXPECT_TRUE(std::equal(sample.betas.begin(), sample.betas.end(), batch.betas.begin()));
+  EXPECT_TRUE(std::equal(sample.body.pose.begin(), sample.body.pose.end(), batch.rotations.begin()));
+  EXPECT_TRUE(std::equal(sample.body.betas.begin(), sample.body.betas.end(), batch.betas.begin()));
   EXPECT_EQ(batch.has_pose[0], 1.0F);
   EXPECT_EQ(batch.family[0], 0);
   // The picture's red channel is 255 x / 320, and the crop is not enlarged: at patch pixel (128, 128) the
@@ -167,10 +167,10 @@ TEST_F(FeedTest, TheBodyTurnsWithThePicture) {
     EXPECT_NEAR(std::remainder(angle_of(body[0], body[1]) - body_before - turned, 2.0 * M_PI), 0.0, 1e-4);
     // Joint 0 is a turn about the same axis; its first column holds cosine and sine.
     const float* orient = batch.rotations.data() + slot * 315;
-    const double orient_before = angle_of(sample.pose[0], sample.pose[3]);
+    const double orient_before = angle_of(sample.body.pose[0], sample.body.pose[3]);
     EXPECT_NEAR(std::remainder(angle_of(orient[0], orient[3]) - orient_before - turned, 2.0 * M_PI), 0.0,
                 1e-4);
-    EXPECT_EQ(orient[9], sample.pose[9]);  // other joints stay
+    EXPECT_EQ(orient[9], sample.body.pose[9]);  // other joints stay
   }
   EXPECT_GT(largest, 0.2);
 }

@@ -14,6 +14,7 @@
 #include "pipeline/dataset/verify.h"
 #include "pipeline/feed/feed.h"
 #include "pipeline/world/world.h"
+#include "smal/camera.h"
 #include "smal/tensors/body.h"
 #include "smal/tensors/rotation.h"
 #include "tests/support/paths.h"
@@ -24,7 +25,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kKeypoints = manifests::kNumKeypoints;
-constexpr double kFocalInCropUnits = 1000.0 / 256.0;
 constexpr int kDraws = 48;  // of six to fourteen samples
 
 // A finished build, its shards as training reads them, and one batch without augmentation.
@@ -101,8 +101,8 @@ std::vector<double> distances(const Pool& pool) {
       EXPECT_EQ(body[3], 1.0F);
       if (annotated[2] == 0.0F) continue;
       const double depth = double{body[2]} + trans[2];
-      const double x = kFocalInCropUnits * (double{body[0]} + trans[0]) / depth;
-      const double y = kFocalInCropUnits * (double{body[1]} + trans[1]) / depth;
+      const double x = smal::kFocalInCropUnits * (double{body[0]} + trans[0]) / depth;
+      const double y = smal::kFocalInCropUnits * (double{body[1]} + trans[1]) / depth;
       result.push_back(std::hypot(x - annotated[0], y - annotated[1]));
     }
   }

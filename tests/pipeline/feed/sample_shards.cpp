@@ -46,9 +46,9 @@ manifests::ShardSample shard_sample(const std::string& id, unsigned seed, bool l
     const double angle = uniform(-1, 1);
     const std::array<double, 9> turn{
         std::cos(angle), -std::sin(angle), 0, std::sin(angle), std::cos(angle), 0, 0, 0, 1};
-    for (std::size_t i = 0; i < 9; ++i) sample.pose[joint * 9 + i] = static_cast<float>(turn[i]);
+    for (std::size_t i = 0; i < 9; ++i) sample.body.pose[joint * 9 + i] = static_cast<float>(turn[i]);
   }
-  for (float& beta : sample.betas) beta = static_cast<float>(uniform(-1, 1));
+  for (float& beta : sample.body.betas) beta = static_cast<float>(uniform(-1, 1));
   for (float& coordinate : sample.keypoints_3d) coordinate = static_cast<float>(uniform(-0.5, 0.5));
   return sample;
 }

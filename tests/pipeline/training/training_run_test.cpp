@@ -176,7 +176,7 @@ TEST_F(TrainingRun, WithoutBioFeaturesTheBioEncoderStartsAnewAndLearns) {
 
 TEST_F(TrainingRun, ALossThatIsNotFiniteNamesTheSamples) {
   manifests::ShardSample bad = testing::shard_sample("poison/0", 5, true);
-  bad.betas[3] = std::numeric_limits<float>::infinity();
+  bad.body.betas[3] = std::numeric_limits<float>::infinity();
   manifests::ShardHeader header;
   header.image_encoding = "png";
   manifests::write_shard(path("poison.h5"), header, {bad});

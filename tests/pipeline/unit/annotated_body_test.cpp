@@ -25,7 +25,7 @@ BodyTruth truth() {
 void expect_rotation(const device::BodyPrediction& body, std::size_t joint,
                      const std::array<float, 9>& expected) {
   for (std::size_t i = 0; i < 9; ++i)
-    EXPECT_NEAR(body.rotations[9 * joint + i], expected[i], 1e-6F) << joint << ' ' << i;
+    EXPECT_NEAR(body.pose[9 * joint + i], expected[i], 1e-6F) << joint << ' ' << i;
 }
 
 TEST(AnnotatedBody, RotationsComeFromAxisAndAngle) {
@@ -46,8 +46,8 @@ TEST(AnnotatedBody, ProjectsWithFocal1000OnACropOf256) {
   EXPECT_NEAR(made.keypoints_2d[0], 1000.0 / 256.0 * 0.6 / 10.0, 1e-6);
   EXPECT_NEAR(made.keypoints_2d[1], 1000.0 / 256.0 * -0.05 / 10.0, 1e-6);
   EXPECT_NEAR(made.keypoints_2d[2], 1000.0 / 256.0 * 0.1 / 10.0, 1e-6);
-  EXPECT_NEAR(made.camera[0], 2.0 * 1000.0 / (256.0 * 10.0), 1e-6);
-  EXPECT_EQ(made.camera[1], 0.1F);
+  EXPECT_NEAR(made.camera.s, 2.0 * 1000.0 / (256.0 * 10.0), 1e-6);
+  EXPECT_EQ(made.camera.tx, 0.1F);
   EXPECT_EQ(made.betas[40], 1.5F);
   EXPECT_EQ(made.translation[2], 10.0F);
   EXPECT_EQ(missing_parts(truth()), "");
@@ -58,7 +58,7 @@ TEST(AnnotatedBody, WithoutATranslationThereIsNoProjection) {
   body.trans = {};
   const device::BodyPrediction made = annotated_body(body);
   EXPECT_FALSE(has_projection(made.keypoints_2d));
-  EXPECT_TRUE(std::isnan(made.camera[0]));
+  EXPECT_TRUE(std::isnan(made.camera.s));
   EXPECT_EQ(made.keypoints_3d[0], 0.5F);  // still a label
   EXPECT_EQ(missing_parts(body), "the file gives no trans that puts the body before the camera");
 }
@@ -81,7 +81,7 @@ TEST(AnnotatedBody, SaysWhatTheFileLacks) {
 
 TEST(AnnotatedBody, NoBodyHasNoProjection) {
   EXPECT_FALSE(has_projection(no_body().keypoints_2d));
-  EXPECT_EQ(no_body().rotations[0], 0.0F);
+  EXPECT_EQ(no_body().pose[0], 0.0F);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "smal/numbers.h"
 #include "tests/support/paths.h"
 
 namespace q3d::pipeline::unit {
@@ -13,10 +14,12 @@ namespace {
 device::BodyPrediction numbered(float first) {
   device::BodyPrediction body;
   float value = first;
-  const auto fill = [&](auto& field) {
-    for (float& element : field) element = value += 0.25F;
+  const auto fill = [&]<typename Value>(Value& field) {
+    smal::NumbersOf<Value> numbers;
+    for (float& number : numbers) number = value += 0.25F;
+    field = smal::from_numbers<Value>(numbers);
   };
-  fill(body.rotations);
+  fill(body.pose);
   fill(body.betas);
   fill(body.camera);
   fill(body.translation);
@@ -27,7 +30,7 @@ device::BodyPrediction numbered(float first) {
 }
 
 void expect_equal(const device::BodyPrediction& a, const device::BodyPrediction& b) {
-  EXPECT_EQ(a.rotations, b.rotations);
+  EXPECT_EQ(a.pose, b.pose);
   EXPECT_EQ(a.betas, b.betas);
   EXPECT_EQ(a.camera, b.camera);
   EXPECT_EQ(a.translation, b.translation);
