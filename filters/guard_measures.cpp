@@ -102,23 +102,20 @@ double limb_factor(const std::array<double, 12>& lengths, const LimbRange& range
   return worst;
 }
 
-double left_right_ratio(std::span<const float> projected, std::span<const float> annotated,
+double left_right_ratio(const smal::CropPoints& projected, const smal::CropKeypoints& annotated,
                         std::span<const int> mirror) {
-  require_count("left_right_ratio", "projected numbers", projected.size(), kKeypoints * 2);
-  require_count("left_right_ratio", "annotated numbers", annotated.size(), kKeypoints * 3);
   require_count("left_right_ratio", "mirror images", mirror.size(), kKeypoints);
   double as_annotated = 0.0;
   double exchanged = 0.0;
   bool has_pair = false;
   for (std::size_t k = 0; k < kKeypoints; ++k) {
     const auto other = static_cast<std::size_t>(mirror[k]);
-    if (other == k || !(annotated[3 * k + 2] > 0.0F) || !(annotated[3 * other + 2] > 0.0F)) continue;
+    if (other == k || !annotated[k].is_visible() || !annotated[other].is_visible()) continue;
     has_pair = true;
-    for (std::size_t axis = 0; axis < 2; ++axis) {
-      const double point = projected[2 * k + axis];
-      as_annotated += std::abs(point - annotated[3 * k + axis]);
-      exchanged += std::abs(point - annotated[3 * other + axis]);
-    }
+    as_annotated += std::abs(double{projected[k].x} - annotated[k].x);
+    as_annotated += std::abs(double{projected[k].y} - annotated[k].y);
+    exchanged += std::abs(double{projected[k].x} - annotated[other].x);
+    exchanged += std::abs(double{projected[k].y} - annotated[other].y);
   }
   if (!has_pair) return std::numeric_limits<double>::quiet_NaN();
   if (as_annotated == exchanged) return 1.0;  // 0 / 0 too: the sides coincide

@@ -6,6 +6,8 @@
 #include <span>
 #include <vector>
 
+#include "smal/keypoints.h"
+
 namespace q3d::filters {
 
 // Official code: PosePriorLoss. Row-major.
@@ -42,9 +44,9 @@ double limb_factor(const std::array<double, 12>& lengths, const LimbRange& range
 
 // Returns the mean error of the keypoints that are visible together with their mirror image, divided by the
 // same error with left and right exchanged in the annotation. It is below 1 if the label has its sides right,
-// and NaN without such a pair. projected: 26 x (x, y); annotated: 26 x (x, y, weight), crop units; mirror:
-// the index of each keypoint's mirror image. Throws std::invalid_argument for wrong counts.
-double left_right_ratio(std::span<const float> projected, std::span<const float> annotated,
+// and NaN without such a pair. mirror: the index of each of the 26 keypoints' mirror image. Throws
+// std::invalid_argument for another count.
+double left_right_ratio(const smal::CropPoints& projected, const smal::CropKeypoints& annotated,
                         std::span<const int> mirror);
 
 // Returns the intersection over union of two silhouettes of equal size. Pixels of 128 and more are inside.

@@ -12,15 +12,11 @@
 
 namespace q3d::filters {
 
-std::vector<std::size_t> shuffled_visible(std::span<const float> annotated, std::uint64_t seed,
+std::vector<std::size_t> shuffled_visible(const smal::CropKeypoints& annotated, std::uint64_t seed,
                                           const std::string& sample_id) {
-  if (annotated.size() != 3 * manifests::kNumKeypoints) {
-    throw std::invalid_argument(fmt::format("keypoints: got {} numbers, expected {}", annotated.size(),
-                                            3 * manifests::kNumKeypoints));
-  }
   std::vector<std::size_t> visible;
-  for (std::size_t k = 0; k < manifests::kNumKeypoints; ++k) {
-    if (annotated[3 * k + 2] > 0.0F) visible.push_back(k);
+  for (std::size_t k = 0; k < annotated.size(); ++k) {
+    if (annotated[k].is_visible()) visible.push_back(k);
   }
   std::mt19937_64 random(
       std::stoull(manifests::sha256(fmt::format("{} {}", seed, sample_id)).substr(0, 16), nullptr, 16));
@@ -31,7 +27,7 @@ std::vector<std::size_t> shuffled_visible(std::span<const float> annotated, std:
   return visible;
 }
 
-KeypointFlags held_out_keypoints(std::span<const float> annotated, double share, std::uint64_t seed,
+KeypointFlags held_out_keypoints(const smal::CropKeypoints& annotated, double share, std::uint64_t seed,
                                  const std::string& sample_id) {
   if (!(share > 0.0 && share < 1.0)) {
     throw std::invalid_argument(

@@ -8,20 +8,11 @@
 #include <string>
 
 #include "smal/camera.h"
-#include "smal/sizes.h"
 
 namespace q3d::filters {
 namespace {
 
-constexpr std::size_t kKeypoints = smal::kNumKeypoints;
 constexpr int kAucThresholds = 100;
-
-void check_keypoints(std::span<const float> projected, std::span<const float> annotated) {
-  if (projected.size() != 2 * kKeypoints || annotated.size() != 3 * kKeypoints) {
-    throw std::invalid_argument("keypoints: got " + std::to_string(projected.size()) + " projected and " +
-                                std::to_string(annotated.size()) + " annotated numbers, expected 52 and 78");
-  }
-}
 
 struct Offset {
   double dx = 0.0;
@@ -29,10 +20,9 @@ struct Offset {
   double weight = 0.0;
 };
 
-Offset offset_of(std::span<const float> projected, std::span<const float> annotated, std::size_t k) {
-  return {static_cast<double>(projected[2 * k]) - static_cast<double>(annotated[3 * k]),
-          static_cast<double>(projected[2 * k + 1]) - static_cast<double>(annotated[3 * k + 1]),
-          static_cast<double>(annotated[3 * k + 2])};
+Offset offset_of(const smal::CropPoint& projected, const smal::CropKeypoint& annotated) {
+  return {double{projected.x} - double{annotated.x}, double{projected.y} - double{annotated.y},
+          double{annotated.weight}};
 }
 
 using Points = Eigen::Matrix<double, 3, Eigen::Dynamic>;
@@ -68,12 +58,12 @@ Points align(const Points& predicted, const Points& truth) {
 
 }  // namespace
 
-std::optional<double> projection_error(std::span<const float> projected, std::span<const float> annotated) {
-  check_keypoints(projected, annotated);
+std::optional<double> projection_error(const smal::CropPoints& projected,
+                                       const smal::CropKeypoints& annotated) {
   double sum = 0.0;
   int visible = 0;
-  for (std::size_t k = 0; k < kKeypoints; ++k) {
-    const Offset offset = offset_of(projected, annotated, k);
+  for (std::size_t k = 0; k < projected.size(); ++k) {
+    const Offset offset = offset_of(projected[k], annotated[k]);
     if (!(offset.weight > 0)) continue;
     sum += std::abs(offset.dx) + std::abs(offset.dy);
     ++visible;
@@ -82,13 +72,12 @@ std::optional<double> projection_error(std::span<const float> projected, std::sp
   return sum / (2.0 * visible);
 }
 
-std::optional<double> pck(std::span<const float> projected, std::span<const float> annotated,
+std::optional<double> pck(const smal::CropPoints& projected, const smal::CropKeypoints& annotated,
                           double normaliser_px, double threshold) {
-  check_keypoints(projected, annotated);
   double hit_weight = 0.0;
   double total_weight = 0.0;
-  for (std::size_t k = 0; k < kKeypoints; ++k) {
-    const Offset offset = offset_of(projected, annotated, k);
+  for (std::size_t k = 0; k < projected.size(); ++k) {
+    const Offset offset = offset_of(projected[k], annotated[k]);
     if (!(offset.weight > 0)) continue;
     total_weight += offset.weight;
     const double distance_px = smal::kCropSidePx * std::hypot(offset.dx, offset.dy);
@@ -99,7 +88,7 @@ std::optional<double> pck(std::span<const float> projected, std::span<const floa
   return hit_weight / total_weight;
 }
 
-std::optional<double> auc(std::span<const float> projected, std::span<const float> annotated,
+std::optional<double> auc(const smal::CropPoints& projected, const smal::CropKeypoints& annotated,
                           double normaliser_px) {
   constexpr double kStep = 1.0 / (kAucThresholds - 1);
   double area = 0.0;

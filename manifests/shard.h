@@ -11,6 +11,7 @@
 #include "manifests/table_reader.h"
 #include "manifests/verdict.h"
 #include "smal/body.h"
+#include "smal/keypoints.h"
 
 namespace q3d::manifests {
 
@@ -41,7 +42,7 @@ struct ShardSample {
   bool has_keypoints_3d = false;
   smal::Body body;
   smal::Keypoints3d keypoints_3d{};
-  std::array<float, kNumKeypoints * 2> projected_2d{};  // keypoints of the body, crop units
+  smal::CropPoints projected_2d{};  // keypoints of the body
 };
 
 struct ShardHeader {

@@ -132,17 +132,15 @@ void normalise_patch(const cv::Mat& patch_rgb, const std::array<double, 3>& colo
   }
 }
 
-std::array<float, manifests::kNumKeypoints * 3> keypoints_to_crop(const manifests::Keypoints& keypoints,
-                                                                  const Affine& patch_from_image) {
+smal::CropKeypoints keypoints_to_crop(const manifests::Keypoints& keypoints, const Affine& patch_from_image) {
   constexpr auto kSide = static_cast<float>(kPatchSidePx);
-  std::array<float, manifests::kNumKeypoints * 3> crop{};
+  smal::CropKeypoints crop{};
   for (std::size_t i = 0; i < keypoints.size(); ++i) {
     // The official code holds annotated pixels in float32 before it applies the affine map in double.
     const Point image_px{static_cast<float>(keypoints[i].x_px), static_cast<float>(keypoints[i].y_px)};
     const Point patch_px = map_point(patch_from_image, image_px);
-    crop[3 * i] = static_cast<float>(patch_px.x) / kSide - 0.5F;
-    crop[3 * i + 1] = static_cast<float>(patch_px.y) / kSide - 0.5F;
-    crop[3 * i + 2] = keypoints[i].weight;
+    crop[i] = {static_cast<float>(patch_px.x) / kSide - 0.5F, static_cast<float>(patch_px.y) / kSide - 0.5F,
+               keypoints[i].weight};
   }
   return crop;
 }

@@ -8,6 +8,7 @@
 #include "loaders/pictures/affine.h"
 #include "manifests/sample.h"
 #include "smal/camera.h"
+#include "smal/keypoints.h"
 
 namespace q3d::loaders::pictures {
 
@@ -65,9 +66,8 @@ void normalise_patch(const cv::Mat& patch_rgb, const std::array<double, 3>& colo
                      std::span<float> planes);
 
 // Maps keypoints of the source image to crop units [-0.5, 0.5]: the affine map is computed in double, stored
-// as float32 px, and then / 256 - 0.5 is computed in float32. Returns 26 x (x, y, weight). Unlabelled points
-// are mapped too, so test the weight.
-std::array<float, manifests::kNumKeypoints * 3> keypoints_to_crop(const manifests::Keypoints& keypoints,
-                                                                  const Affine& patch_from_image);
+// as float32 px, and then / 256 - 0.5 is computed in float32. Unlabelled points are mapped too, so ask
+// is_visible().
+smal::CropKeypoints keypoints_to_crop(const manifests::Keypoints& keypoints, const Affine& patch_from_image);
 
 }  // namespace q3d::loaders::pictures

@@ -20,13 +20,11 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
-using Projection = std::array<float, manifests::kNumKeypoints * 2>;  // crop units
-
 // What is known of the candidate besides its row of verdicts.csv.
 struct Evidence {
   manifests::SampleRecord record;  // id, image_ref, box and keypoints
-  std::optional<Projection> before;
-  std::optional<Projection> after;
+  std::optional<smal::CropPoints> before;
+  std::optional<smal::CropPoints> after;
   std::vector<double> curve;
   std::vector<double> held_out_curve;
   std::optional<filters::LabelMeasures> measures;
@@ -82,11 +80,11 @@ Evidence gather(const PublishedDataset& dataset, const VerdictRow& row) {
 }
 
 // (|dx| + |dy|) / 2: the mean of these over the visible keypoints is L_proj.
-ordered_json keypoint_error(const std::optional<Projection>& projected,
+ordered_json keypoint_error(const std::optional<smal::CropPoints>& projected,
                             const device::CropKeypoints& annotated, std::size_t k) {
-  if (!projected || !(annotated[3 * k + 2] > 0.0F)) return nullptr;
-  const double dx = double{(*projected)[2 * k]} - annotated[3 * k];
-  const double dy = double{(*projected)[2 * k + 1]} - annotated[3 * k + 1];
+  if (!projected || !annotated[k].is_visible()) return nullptr;
+  const double dx = double{(*projected)[k].x} - annotated[k].x;
+  const double dy = double{(*projected)[k].y} - annotated[k].y;
   return number_or_null((std::abs(dx) + std::abs(dy)) / 2.0);
 }
 

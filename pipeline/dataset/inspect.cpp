@@ -55,7 +55,7 @@ ordered_json describe_whole(const fs::path& shard, const manifests::ShardSample&
       {"betas", sample.body.betas},
       {"pose", sample.body.pose},
       {"keypoints_3d", sample.keypoints_3d},
-      {"projected_2d", sample.projected_2d},
+      {"projected_2d", smal::numbers_of(sample.projected_2d)},
       {"record", record}};
 }
 

@@ -150,12 +150,12 @@ class Verifier {
     double worst = 0.0;  // relative for what lies far outside the crop
     for (int k = 0; k < manifests::kNumKeypoints; ++k) {
       const auto at = static_cast<std::size_t>(k);
+      const std::array stored{sample.projected_2d[at].x, sample.projected_2d[at].y};
       const double z = double{sample.keypoints_3d[3 * at + 2]} + sample.body.translation[2];
       for (std::size_t axis = 0; axis < 2; ++axis) {
         const double point = double{sample.keypoints_3d[3 * at + axis]} + sample.body.translation[axis];
         const double projected = smal::kFocalInCropUnits * point / z;
-        const double difference =
-            std::abs(projected - sample.projected_2d[2 * at + axis]) / std::max(1.0, std::abs(projected));
+        const double difference = std::abs(projected - stored[axis]) / std::max(1.0, std::abs(projected));
         worst =
             std::isnan(difference) ? std::numeric_limits<double>::infinity() : std::max(worst, difference);
       }

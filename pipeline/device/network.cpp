@@ -17,8 +17,9 @@ bool all_finite(const T& values) {
 
 bool is_finite(const BodyPrediction& body) {
   return all_finite(body.pose) && all_finite(body.betas) && all_finite(smal::numbers_of(body.camera)) &&
-         all_finite(body.translation) && all_finite(body.keypoints_3d) && all_finite(body.keypoints_2d) &&
-         all_finite(body.aux_keypoints_2d);
+         all_finite(body.translation) && all_finite(body.keypoints_3d) &&
+         all_finite(smal::numbers_of(body.keypoints_2d)) &&
+         all_finite(smal::numbers_of(body.aux_keypoints_2d));
 }
 
 }  // namespace q3d::pipeline::device

@@ -8,21 +8,21 @@
 #include <vector>
 
 #include "filters/keypoint_choice.h"
-#include "manifests/sample.h"
 #include "smal/body.h"
+#include "smal/keypoints.h"
 
 namespace q3d::pipeline::device {
 
-// A body and its keypoints as the network gives them. The 2D keypoints are in crop units.
+// A body and its keypoints as the network gives them.
 struct BodyPrediction : smal::Body {
   smal::Keypoints3d keypoints_3d{};
-  std::array<float, manifests::kNumKeypoints * 2> keypoints_2d{};
-  std::array<float, manifests::kNumKeypoints * 2> aux_keypoints_2d{};
+  smal::CropPoints keypoints_2d{};
+  smal::CropPoints aux_keypoints_2d{};
 };
 bool is_finite(const BodyPrediction& body);
 
-using CropKeypoints = std::array<float, manifests::kNumKeypoints * 3>;  // x, y in crop units and a weight
-using PatchView = std::span<const std::uint8_t>;                        // 256 x 256 x 3 RGB, row-major
+using smal::CropKeypoints;
+using PatchView = std::span<const std::uint8_t>;  // 256 x 256 x 3 RGB, row-major
 
 struct AdaptRequest {
   PatchView patch;

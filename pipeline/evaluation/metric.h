@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "manifests/sample.h"
 #include "pipeline/device/body_meshes.h"
 #include "pipeline/device/network.h"
 
@@ -44,7 +45,7 @@ MetricMean mean_of(std::span<const MetricValues* const> samples, std::size_t met
 
 // What a prediction is measured against.
 struct Target {
-  device::CropKeypoints keypoints{};         // annotated, crop units and weight
+  device::CropKeypoints keypoints{};         // annotated
   double normaliser_px = smal::kCropSidePx;  // sqrt(mask area) of the 256-px crop, or 256 for the whole crop
   bool normalised_by_mask = false;
   std::optional<smal::Keypoints3d> keypoints_3d;

@@ -68,7 +68,7 @@ device::CropKeypoints hide_keypoints(const device::CropKeypoints& keypoints, dou
   // The tolerance keeps 0.7 * 10 at 7.
   const auto shown = static_cast<std::size_t>(std::ceil(share * static_cast<double>(visible.size()) - 1e-9));
   device::CropKeypoints result = keypoints;
-  for (std::size_t i = shown; i < visible.size(); ++i) result[3 * visible[i] + 2] = 0.0F;
+  for (std::size_t i = shown; i < visible.size(); ++i) result[visible[i]].weight = 0.0F;
   return result;
 }
 

@@ -14,6 +14,7 @@
 #include "loaders/keypoints/mirror.h"
 #include "loaders/pictures/encode.h"
 #include "loaders/pictures/stored_crop.h"
+#include "smal/numbers.h"
 
 namespace q3d::pipeline::feed {
 namespace {
@@ -63,11 +64,12 @@ void turn_orientation(std::span<float> rotation, double rotation_deg) {
 
 void fill_keypoints_2d(const TrainingSample& sample, const loaders::pictures::Affine& patch_from_image,
                        KeypointWeight weight, bool mirror, std::span<float> out) {
-  const auto keypoints = loaders::pictures::keypoints_to_crop(sample.keypoints, patch_from_image);
-  std::copy(keypoints.begin(), keypoints.end(), out.begin());
+  smal::CropKeypoints keypoints = loaders::pictures::keypoints_to_crop(sample.keypoints, patch_from_image);
   if (weight == KeypointWeight::raw_v) {  // a v below 0 would reward errors
-    for (std::size_t i = 0; i < kKeypoints; ++i) out[3 * i + 2] = std::max(0.0F, sample.keypoints[i].v);
+    for (std::size_t i = 0; i < kKeypoints; ++i) keypoints[i].weight = std::max(0.0F, sample.keypoints[i].v);
   }
+  const auto numbers = smal::numbers_of(keypoints);
+  std::copy(numbers.begin(), numbers.end(), out.begin());
   if (mirror) loaders::keypoints::swap_keypoint_sides(out, 3);
 }
 

@@ -150,12 +150,13 @@ std::vector<device::AdaptOutcome> TorchNetwork::adapt(std::span<const device::Ad
     std::vector<device::PatchView> patches;
     std::vector<model::TtaSchedule> schedules;
     torch::Tensor keypoints =
-        torch::empty({static_cast<std::int64_t>(batch.size()), manifests::kNumKeypoints, 3}, torch::kFloat32);
+        torch::empty({static_cast<std::int64_t>(batch.size()), smal::kNumKeypoints, 3}, torch::kFloat32);
     float* out = keypoints.data_ptr<float>();
     for (const device::AdaptRequest& request : batch) {
       patches.push_back(request.patch);
       schedules.push_back(schedule_of(request));
-      out = std::copy(request.keypoints.begin(), request.keypoints.end(), out);
+      const auto numbers = smal::numbers_of(request.keypoints);
+      out = std::copy(numbers.begin(), numbers.end(), out);
     }
     const model::ImageFeatures features = [&] {
       const torch::NoGradGuard no_gradients;

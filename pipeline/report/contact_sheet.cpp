@@ -44,11 +44,11 @@ void draw_keypoints(cv::Mat& tile, const manifests::ShardSample& sample) {
   const device::CropKeypoints annotated = unit::crop_keypoints(sample.record);
   const bool has_body = unit::has_projection(sample.projected_2d);
   for (std::size_t k = 0; k < manifests::kNumKeypoints; ++k) {
-    const cv::Point point = to_tile(annotated[3 * k], annotated[3 * k + 1]);
-    const bool visible = annotated[3 * k + 2] > 0;
+    const cv::Point point = to_tile(annotated[k].x, annotated[k].y);
+    const bool visible = annotated[k].is_visible();
     if (visible) cv::circle(tile, point, 3, kAnnotated, cv::FILLED, cv::LINE_AA);
     if (!has_body) continue;
-    const cv::Point projected = to_tile(sample.projected_2d[2 * k], sample.projected_2d[2 * k + 1]);
+    const cv::Point projected = to_tile(sample.projected_2d[k].x, sample.projected_2d[k].y);
     if (visible) cv::line(tile, point, projected, kProjected, 1, cv::LINE_AA);
     cv::drawMarker(tile, projected, kProjected, cv::MARKER_TILTED_CROSS, 6, 1, cv::LINE_AA);
   }

@@ -20,10 +20,11 @@ bool is_before_camera(const manifests::BodyTruth& truth) {
 void project(device::BodyPrediction& body) {
   for (std::size_t k = 0; k < manifests::kNumKeypoints; ++k) {
     const double depth = double{body.keypoints_3d[3 * k + 2]} + body.translation[2];
-    for (std::size_t axis = 0; axis < 2; ++axis) {
+    const auto on_axis = [&](std::size_t axis) {
       const double point = double{body.keypoints_3d[3 * k + axis]} + body.translation[axis];
-      body.keypoints_2d[2 * k + axis] = static_cast<float>(smal::kFocalInCropUnits * point / depth);
-    }
+      return static_cast<float>(smal::kFocalInCropUnits * point / depth);
+    };
+    body.keypoints_2d[k] = {on_axis(0), on_axis(1)};
   }
 }
 
@@ -32,7 +33,7 @@ void project(device::BodyPrediction& body) {
 device::BodyPrediction no_body() {
   device::BodyPrediction body;
   body.camera = {kNaN, kNaN, kNaN};
-  body.keypoints_2d.fill(kNaN);
+  body.keypoints_2d.fill({kNaN, kNaN});
   return body;
 }
 
@@ -49,8 +50,8 @@ device::BodyPrediction annotated_body(const manifests::BodyTruth& truth) {
   return body;
 }
 
-bool has_projection(const std::array<float, manifests::kNumKeypoints * 2>& keypoints_2d) {
-  return !std::isnan(keypoints_2d[0]);
+bool has_projection(const smal::CropPoints& keypoints_2d) {
+  return !std::isnan(keypoints_2d[0].x);
 }
 
 std::string missing_parts(const manifests::BodyTruth& truth) {

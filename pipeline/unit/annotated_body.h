@@ -22,7 +22,7 @@ device::BodyPrediction annotated_body(const manifests::BodyTruth& truth);
 device::BodyPrediction no_body();
 
 // Whether keypoints_2d holds a projection.
-bool has_projection(const std::array<float, manifests::kNumKeypoints * 2>& keypoints_2d);
+bool has_projection(const smal::CropPoints& keypoints_2d);
 
 // What a truth's label will lack, in words; empty when it lacks nothing.
 std::string missing_parts(const manifests::BodyTruth& truth);

@@ -1,5 +1,7 @@
 #include "pipeline/unit/crop_keypoints.h"
 
+#include <algorithm>
+
 #include "loaders/pictures/crop.h"
 
 namespace q3d::pipeline::unit {
@@ -11,9 +13,8 @@ device::CropKeypoints crop_keypoints(const manifests::SampleRecord& record) {
 }
 
 int visible_keypoints(const device::CropKeypoints& keypoints) {
-  int visible = 0;
-  for (std::size_t k = 0; k < manifests::kNumKeypoints; ++k) visible += keypoints[3 * k + 2] > 0.0F ? 1 : 0;
-  return visible;
+  return static_cast<int>(std::count_if(keypoints.begin(), keypoints.end(),
+                                        [](const smal::CropKeypoint& k) { return k.is_visible(); }));
 }
 
 }  // namespace q3d::pipeline::unit

@@ -127,12 +127,11 @@ std::array<int, 26> mirror() {
 }
 
 struct Sample {
-  std::array<float, 52> projected{};
-  std::array<float, 78> annotated{};
+  smal::CropPoints projected{};
+  smal::CropKeypoints annotated{};
   void place(std::size_t k, float projected_x, float annotated_x, float weight = 1.0F) {
-    projected[2 * k] = projected_x;
-    annotated[3 * k] = annotated_x;
-    annotated[3 * k + 2] = weight;
+    projected[k].x = projected_x;
+    annotated[k] = {annotated_x, 0.0F, weight};
   }
   double ratio() const { return left_right_ratio(projected, annotated, mirror()); }
 };
@@ -143,7 +142,7 @@ TEST(LeftRight, ComparesTheErrorWithThatOfExchangedSides) {
   sample.place(1, 0.5F, 0.5F);
   // As annotated 0.125 + 0; exchanged |0.125 - 0.5| + |0.5 - 0|.
   EXPECT_DOUBLE_EQ(sample.ratio(), 0.125 / 0.875);
-  std::swap(sample.projected[0], sample.projected[2]);
+  std::swap(sample.projected[0], sample.projected[1]);
   EXPECT_DOUBLE_EQ(sample.ratio(), 7.0);
 }
 

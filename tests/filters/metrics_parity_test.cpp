@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "filters/metrics.h"
+#include "smal/numbers.h"
 #include "smal/tensors/body.h"
 #include "smal/tensors/rotation.h"
 #include "smal/tensors/safetensors.h"
@@ -36,6 +37,16 @@ constexpr double kQuotient = 8.0 * kRounding;
 
 std::span<const float> view(const torch::Tensor& tensor) {
   return {tensor.data_ptr<float>(), static_cast<std::size_t>(tensor.numel())};
+}
+
+// The 26 rows of a golden tensor in crop units.
+template <typename Values>
+Values crop_values(const torch::Tensor& tensor) {
+  smal::NumbersOf<Values> numbers{};
+  const std::span<const float> values = view(tensor);
+  if (values.size() != numbers.size()) throw std::runtime_error("the tensor has another count of numbers");
+  std::copy(values.begin(), values.end(), numbers.begin());
+  return smal::from_numbers<Values>(numbers);
 }
 
 // How far float32 may move a point that it aligns, in the unit of the points: a few roundings of the largest
@@ -84,15 +95,18 @@ class MetricsParity : public ::testing::Test {
   }
 
   static double normaliser_px(std::size_t i) { return std::sqrt(number("mask_sum", i)); }
+  static smal::CropPoints projected(std::size_t i) {
+    return crop_values<smal::CropPoints>(golden("pred_keypoints_2d", i));
+  }
+  static smal::CropKeypoints annotated(std::size_t i) {
+    return crop_values<smal::CropKeypoints>(golden("gt_keypoints_2d", i));
+  }
   // With the official rule: no visible keypoint counts as 0.
   static double official_pck(std::size_t i, double normaliser, double threshold) {
-    return pck(view(golden("pred_keypoints_2d", i)), view(golden("gt_keypoints_2d", i)), normaliser,
-               threshold)
-        .value_or(0.0);
+    return pck(projected(i), annotated(i), normaliser, threshold).value_or(0.0);
   }
   static double official_auc(std::size_t i, double normaliser) {
-    return auc(view(golden("pred_keypoints_2d", i)), view(golden("gt_keypoints_2d", i)), normaliser)
-        .value_or(0.0);
+    return auc(projected(i), annotated(i), normaliser).value_or(0.0);
   }
   static torch::Tensor true_keypoints_3d(std::size_t i) {
     return golden("gt_keypoints_3d", i).slice(1, 0, 3).contiguous();
@@ -233,8 +247,7 @@ TEST_F(MetricsParity, BatchMeans3d) {
 
 TEST_F(MetricsParity, OnlyASampleWithoutVisibleKeypointsHasNoValue) {
   for (std::size_t i = 0; i < cases_.size(); ++i) {
-    const auto value =
-        pck(view(golden("pred_keypoints_2d", i)), view(golden("gt_keypoints_2d", i)), normaliser_px(i), 0.1);
+    const auto value = pck(projected(i), annotated(i), normaliser_px(i), 0.1);
     EXPECT_EQ(value.has_value(), cases_[i] != "zerovis") << cases_[i];
   }
 }

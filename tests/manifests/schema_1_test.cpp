@@ -55,7 +55,12 @@ void expect_arrays(const ShardSample& sample, int row) {
               7 + above);
   expect_ramp("trans", sample.body.translation, 8 + above);
   expect_ramp("keypoints_3d", sample.keypoints_3d, 9 + above);
-  expect_ramp("projected_2d", sample.projected_2d, 10 + above);
+  std::array<float, 2 * kNumKeypoints> projected{};
+  for (std::size_t k = 0; k < kNumKeypoints; ++k) {
+    projected[2 * k] = sample.projected_2d[k].x;
+    projected[2 * k + 1] = sample.projected_2d[k].y;
+  }
+  expect_ramp("projected_2d", projected, 10 + above);
 }
 
 class Schema1 : public ::testing::Test {

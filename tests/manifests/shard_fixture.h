@@ -73,7 +73,9 @@ inline manifests::ShardSample make_shard_sample(int row) {
   sample.body.camera = smal::from_numbers<smal::Camera>(camera);
   fill(std::span(sample.body.translation), 8, row);
   fill(std::span(sample.keypoints_3d), 9, row);
-  fill(std::span(sample.projected_2d), 10, row);
+  smal::NumbersOf<smal::CropPoints> projected{};
+  fill(std::span(projected), 10, row);
+  sample.projected_2d = smal::from_numbers<smal::CropPoints>(projected);
   if (row == 1) {
     BodyTruth& truth = record.truth.emplace();
     truth.has_betas = true;

@@ -10,6 +10,7 @@
 #include "loaders/pictures/augment.h"
 #include "loaders/pictures/crop.h"
 #include "loaders/pictures/demo_crop.h"
+#include "smal/numbers.h"
 #include "smal/tensors/safetensors.h"
 #include "tests/support/paths.h"
 
@@ -118,7 +119,7 @@ TEST_F(CropParity, train_geometry_and_keypoints) {
     expect_equal(torch::tensor({box.center_x_px, box.center_y_px}), crops_.tensor(name + "_box_center"),
                  name);
     expect_equal(torch::tensor({box.side_px}, torch::kFloat64), crops_.tensor(name + "_box_size"), name);
-    expect_equal(tensor_of(keypoints_to_crop(samples_[i].keypoints, affine)).view({26, 3}),
+    expect_equal(tensor_of(smal::numbers_of(keypoints_to_crop(samples_[i].keypoints, affine))).view({26, 3}),
                  crops_.tensor(name + "_keypoints_2d"), name + "_keypoints_2d");
   }
 }
@@ -130,7 +131,7 @@ TEST_F(CropParity, evaluation_geometry_and_keypoints) {
     const Affine affine = patch_from_image(box, kPatchSidePx);
     expect_equal(tensor_of(affine), crops_.tensor(name + "__trans"), name + "__trans");
     expect_equal(torch::tensor({box.side_px}, torch::kFloat64), crops_.tensor(name + "_box_size"), name);
-    expect_equal(tensor_of(keypoints_to_crop(samples_[i].keypoints, affine)).view({26, 3}),
+    expect_equal(tensor_of(smal::numbers_of(keypoints_to_crop(samples_[i].keypoints, affine))).view({26, 3}),
                  crops_.tensor(name + "_keypoints_2d"), name + "_keypoints_2d");
     const Patch patch = make_patch(samples_[i].rgb, samples_[i].mask, box);
     const bool equals_train =
@@ -195,7 +196,7 @@ TEST_F(CropParity, augmented_patches_and_labels) {
     expect_near(tensor_of(patch.mask).to(torch::kFloat64).sum().view({1}) / 255.0,
                 augment_.tensor(name + "_mask_sum"), 1e-2, name + "_mask_sum");
 
-    expect_equal(tensor_of(keypoints_to_crop(sample.keypoints, affine)).view({26, 3}),
+    expect_equal(tensor_of(smal::numbers_of(keypoints_to_crop(sample.keypoints, affine))).view({26, 3}),
                  augment_.tensor(name + "_keypoints_2d"), name + "_keypoints_2d");
     const torch::Tensor turned = augment_.tensor(name + "_keypoints_3d").slice(1, 0, 3);
     expect_near(tensor_of(rotate_keypoints_3d(sample.keypoints_3d, drawn.rotation_deg)).view({26, 3}), turned,

@@ -32,7 +32,7 @@ ShardSample flat_sample(const std::string& id) {
   sample.image_height_px = 48;
   constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
   sample.body.camera = {kNaN, kNaN, kNaN};
-  sample.projected_2d.fill(kNaN);
+  sample.projected_2d.fill({kNaN, kNaN});
   return sample;
 }
 

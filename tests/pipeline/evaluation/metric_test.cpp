@@ -27,9 +27,8 @@ struct Exact {
   Exact() {
     for (std::size_t k = 0; k < manifests::kNumKeypoints; ++k) {
       const float x = 0.01F * static_cast<float>(k);
-      body.keypoints_2d[2 * k] = x;
-      target.keypoints[3 * k] = x;
-      target.keypoints[3 * k + 2] = k < 10 ? 1.0F : 0.0F;
+      body.keypoints_2d[k].x = x;
+      target.keypoints[k] = {x, 0.0F, k < 10 ? 1.0F : 0.0F};
       for (std::size_t axis = 0; axis < 3; ++axis) {
         body.keypoints_3d[3 * k + axis] = std::sin(static_cast<float>(3 * k + axis));
       }
@@ -53,8 +52,7 @@ TEST(Measure, AnExactPrediction) {
 // the whole crop at 0.078, below both.
 TEST(Measure, TheMaskSetsTheScale) {
   Exact exact;
-  for (std::size_t k = 0; k < 4; ++k)
-    exact.body.keypoints_2d[2 * k + 1] += static_cast<float>(20.0 / kSidePx);
+  for (std::size_t k = 0; k < 4; ++k) exact.body.keypoints_2d[k].y += static_cast<float>(20.0 / kSidePx);
   exact.target.normaliser_px = 160.0;
   const MetricValues by_mask = measure(exact.body, nullptr, exact.target);
   EXPECT_NEAR(value(by_mask, Metric::pck_10), 60.0, 1e-9);
@@ -77,7 +75,7 @@ TEST(Measure, SizeAndTurnOfABodyDoNotCount) {
 
 TEST(Measure, WithoutAVisibleKeypointOnly3dIsMeasured) {
   Exact exact;
-  for (std::size_t k = 0; k < manifests::kNumKeypoints; ++k) exact.target.keypoints[3 * k + 2] = 0.0F;
+  for (smal::CropKeypoint& keypoint : exact.target.keypoints) keypoint.weight = 0.0F;
   const MetricValues values = measure(exact.body, nullptr, exact.target);
   for (const MetricInfo& info : kMetrics) {
     EXPECT_EQ(values[index_of(info.metric)].has_value(), info.metric == Metric::pa_mpjpe) << info.key;

@@ -53,14 +53,14 @@ TEST(PlanSettings, RefusesWhatHasNoMeaning) {
 
 device::CropKeypoints with_visible(std::size_t count) {
   device::CropKeypoints keypoints{};
-  for (std::size_t k = 0; k < count; ++k) keypoints[3 * k + 2] = 1.0F;
+  for (std::size_t k = 0; k < count; ++k) keypoints[k].weight = 1.0F;
   return keypoints;
 }
 
 std::vector<std::size_t> visible(const device::CropKeypoints& keypoints) {
   std::vector<std::size_t> result;
-  for (std::size_t k = 0; k < manifests::kNumKeypoints; ++k) {
-    if (keypoints[3 * k + 2] > 0.0F) result.push_back(k);
+  for (std::size_t k = 0; k < keypoints.size(); ++k) {
+    if (keypoints[k].is_visible()) result.push_back(k);
   }
   return result;
 }

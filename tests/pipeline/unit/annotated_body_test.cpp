@@ -43,9 +43,9 @@ TEST(AnnotatedBody, RotationsComeFromAxisAndAngle) {
 TEST(AnnotatedBody, ProjectsWithFocal1000OnACropOf256) {
   const device::BodyPrediction made = annotated_body(truth());
   ASSERT_TRUE(has_projection(made.keypoints_2d));
-  EXPECT_NEAR(made.keypoints_2d[0], 1000.0 / 256.0 * 0.6 / 10.0, 1e-6);
-  EXPECT_NEAR(made.keypoints_2d[1], 1000.0 / 256.0 * -0.05 / 10.0, 1e-6);
-  EXPECT_NEAR(made.keypoints_2d[2], 1000.0 / 256.0 * 0.1 / 10.0, 1e-6);
+  EXPECT_NEAR(made.keypoints_2d[0].x, 1000.0 / 256.0 * 0.6 / 10.0, 1e-6);
+  EXPECT_NEAR(made.keypoints_2d[0].y, 1000.0 / 256.0 * -0.05 / 10.0, 1e-6);
+  EXPECT_NEAR(made.keypoints_2d[1].x, 1000.0 / 256.0 * 0.1 / 10.0, 1e-6);
   EXPECT_NEAR(made.camera.s, 2.0 * 1000.0 / (256.0 * 10.0), 1e-6);
   EXPECT_EQ(made.camera.tx, 0.1F);
   EXPECT_EQ(made.betas[40], 1.5F);

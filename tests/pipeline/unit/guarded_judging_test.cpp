@@ -41,7 +41,7 @@ struct GivenUnit {
     for (int k = 0; k < visible; ++k) {
       candidate.record.keypoints[static_cast<std::size_t>(k)] = {128.0, 128.0, 1.0F, 1.0F};
     }
-    predicted.emplace_back().body.keypoints_2d.fill(error);
+    predicted.emplace_back().body.keypoints_2d.fill({error, error});
   }
   void refine(std::size_t sample, std::vector<double> curve, std::vector<double> held_out = {}) {
     work.refined->push_back({sample, std::move(curve), {}, std::move(held_out)});

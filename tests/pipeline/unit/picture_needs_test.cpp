@@ -69,7 +69,7 @@ struct OneCandidate {
   void predict(float error) {
     set_candidates(work, candidates);
     std::vector<PredictedSample> samples(1);
-    samples[0].body.keypoints_2d.fill(error);
+    samples[0].body.keypoints_2d.fill({error, error});
     set_predictions(work, std::move(samples));
   }
   PictureFacts facts() const { return picture_facts(work, 0, &rules); }
