@@ -61,7 +61,7 @@ void write_made_shard(const fs::path& path) {
   }
   fmt::print("made 256 crops of {} px, {} kB each\n", samples[0].crop_side_px, bytes / 256 / 1000);
   manifests::ShardHeader header;
-  header.image_encoding = "jpeg";
+  header.image_encoding = manifests::ImageEncoding::jpeg;
   manifests::write_shard(path, header, samples);
 }
 

@@ -14,11 +14,6 @@ namespace q3d::manifests {
 namespace {
 
 constexpr std::string_view kFormat = "quadruped3d-shard";
-constexpr std::array<std::string_view, 3> kImageEncodings{"jpeg", "png", "reference"};
-
-bool is_image_encoding(std::string_view name) {
-  return std::find(kImageEncodings.begin(), kImageEncodings.end(), name) != kImageEncodings.end();
-}
 
 // What a reader without docs/shard-format.md needs to know about each column.
 std::string describe_columns() {
@@ -33,7 +28,7 @@ std::string describe_columns() {
 }
 
 void check_sample(const ShardHeader& header, const ShardSample& sample) {
-  const bool must_have_crop = header.image_encoding != "reference";
+  const bool must_have_crop = header.image_encoding != ImageEncoding::reference;
   if (sample.record.failure != Reason::none) {
     throw std::invalid_argument(fmt::format("sample {} failed ({}) and cannot be in a shard",
                                             sample.record.id, to_string(sample.record.failure)));
@@ -41,7 +36,7 @@ void check_sample(const ShardHeader& header, const ShardSample& sample) {
   if (sample.crop.empty() == must_have_crop || (!must_have_crop && !sample.crop_mask.empty())) {
     throw std::invalid_argument(
         fmt::format("sample {} has a crop of {} bytes and a mask of {} in a shard of {}", sample.record.id,
-                    sample.crop.size(), sample.crop_mask.size(), header.image_encoding));
+                    sample.crop.size(), sample.crop_mask.size(), to_string(header.image_encoding)));
   }
 }
 
@@ -93,17 +88,20 @@ ShardHeader read_header(const TableReader& table) {
     }
     return found->second;
   };
-  ShardHeader header{kShardSchema, text("dataset"), text("version"), 0, text("image_encoding")};
+  ShardHeader header{.dataset = text("dataset"), .version = text("version")};
   const std::string& unit = text("unit");
   const auto [end, error] = std::from_chars(unit.data(), unit.data() + unit.size(), header.unit);
   if (error != std::errc() || end != unit.data() + unit.size()) {
     throw std::runtime_error(
         fmt::format("{}: attribute unit is \"{}\", expected a whole number", table.path().string(), unit));
   }
-  if (!is_image_encoding(header.image_encoding)) {
+  const std::string& encoding = text("image_encoding");
+  try {
+    header.image_encoding = image_encoding_from_string(encoding);
+  } catch (const std::invalid_argument&) {
     throw std::runtime_error(
         fmt::format("{}: attribute image_encoding is \"{}\", expected jpeg, png or reference",
-                    table.path().string(), header.image_encoding));
+                    table.path().string(), encoding));
   }
   return header;
 }
@@ -164,17 +162,18 @@ void load_column(const TableReader& table, const ShardColumn& column, std::int64
 
 std::string write_shard(const std::filesystem::path& path, const ShardHeader& header,
                         const std::vector<ShardSample>& samples) {
-  if (header.schema != kShardSchema || !is_image_encoding(header.image_encoding)) {
+  if (header.schema != kShardSchema) {
     throw std::invalid_argument(
-        fmt::format("a shard header of schema {} and image encoding \"{}\"; expected {} "
-                    "and jpeg, png or reference",
-                    header.schema, header.image_encoding, kShardSchema));
+        fmt::format("a shard header of schema {}, expected {}", header.schema, kShardSchema));
   }
   Table table;
   table.rows = static_cast<std::int64_t>(samples.size());
-  table.attributes = {{"format", std::string(kFormat)},      {"schema", std::to_string(header.schema)},
-                      {"dataset", header.dataset},           {"version", header.version},
-                      {"unit", std::to_string(header.unit)}, {"image_encoding", header.image_encoding},
+  table.attributes = {{"format", std::string(kFormat)},
+                      {"schema", std::to_string(header.schema)},
+                      {"dataset", header.dataset},
+                      {"version", header.version},
+                      {"unit", std::to_string(header.unit)},
+                      {"image_encoding", std::string(to_string(header.image_encoding))},
                       {"columns", describe_columns()}};
   for (const ShardSample& sample : samples) check_sample(header, sample);
   for (const ShardColumn& column : shard_columns()) add_column(table, column, samples);

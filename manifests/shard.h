@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "manifests/image_encoding.h"
 #include "manifests/sample.h"
 #include "manifests/table_reader.h"
 #include "manifests/verdict.h"
@@ -50,13 +51,13 @@ struct ShardHeader {
   std::string dataset;  // name of the build
   std::string version;  // config key of the build
   std::int64_t unit = 0;
-  std::string image_encoding;  // "jpeg", "png" or "reference"
+  ImageEncoding image_encoding = ImageEncoding::jpeg;
 };
 
 // Writes one shard atomically and returns its SHA-256. Equal input gives equal bytes. Absolute paths are not
 // written. Throws std::runtime_error that names the path (disk full, ...). Throws std::invalid_argument that
-// names a sample which cannot be in a shard: a failed record, a crop although the header says "reference", or
-// no crop although it does not.
+// names a sample which cannot be in a shard: a failed record, a crop in a shard of references, or no crop in
+// another one.
 std::string write_shard(const std::filesystem::path& path, const ShardHeader& header,
                         const std::vector<ShardSample>& samples);
 

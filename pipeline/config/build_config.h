@@ -14,6 +14,8 @@
 #include "filters/calibrate.h"
 #include "filters/guards.h"
 #include "loaders/formats/dataset.h"
+#include "manifests/image_encoding.h"
+#include "pipeline/config/network_words.h"
 #include "pipeline/config/role.h"
 
 namespace q3d::pipeline::config {
@@ -31,14 +33,14 @@ struct NetworkConfig {
   std::filesystem::path checkpoint;  // safetensors, official parameter names
   std::filesystem::path smal_asset;  // safetensors; see smal/tensors/asset.h
   std::string device = "auto";       // auto, cpu, cuda, cuda:I
-  std::string dtype = "float32";     // float32, bfloat16
-  int batch = 8;                     // crops in one forward pass; batches never cross a unit
+  Dtype dtype = Dtype::float32;
+  int batch = 8;  // crops in one forward pass; batches never cross a unit
   int compute_threads =
       0;  // threads of one CPU operator; 0 = as the network's size suggests. Part of the key.
 };
 
 struct TtaConfig {
-  std::string objective = "paper";  // paper, demo
+  TtaObjective objective = TtaObjective::paper;
   double learning_rate = 1e-6;
   double aux_weight = 5.0;
   double reproj_weight = 0.5;
@@ -76,8 +78,8 @@ struct CalibrateConfig : filters::TargetShares {
 };
 
 struct ShardConfig {
-  int unit_size = 512;          // candidates of one work unit = one shard
-  std::string images = "jpeg";  // jpeg, png or reference (no pictures in the shards)
+  int unit_size = 512;  // candidates of one work unit = one shard
+  manifests::ImageEncoding images = manifests::ImageEncoding::jpeg;
   int jpeg_quality = 95;
   double crop_scale = 1.9;  // the stored crop's side over the box's longer side
   int crop_min_side_px = 480;

@@ -10,9 +10,16 @@ constexpr Range kPositive{.least = 0, .is_open_below = true};
 constexpr Range kAtLeastOne{.least = 1};
 constexpr Range kNotNegative{.least = 0};
 
-Word<DatasetConfig> role_word() {
-  return {[](const DatasetConfig& dataset) { return std::string(to_string(dataset.role)); },
-          [](DatasetConfig& dataset, const std::string& word) { dataset.role = role_from_string(word); }};
+// The word of a member that is an enum.
+template <typename Struct, typename Enum>
+Word<Struct> word_of(Enum Struct::*member, Enum (*from_string)(std::string_view)) {
+  return {
+      [member](const Struct& config) { return std::string(to_string(config.*member)); },
+      [member, from_string](Struct& config, const std::string& word) { config.*member = from_string(word); }};
+}
+
+std::vector<std::string> texts(std::span<const std::string_view> names) {
+  return {names.begin(), names.end()};
 }
 
 Word<DatasetConfig> keypoints_3d_word() {
@@ -71,7 +78,7 @@ const Settings<DatasetConfig>& dataset_settings() {
        .is_required = true},
       {.key = "split", .member = &DatasetConfig::split, .description = "second part of every sample id"},
       {.key = "role",
-       .member = role_word(),
+       .member = word_of(&DatasetConfig::role, role_from_string),
        .description = "where the labels come from, see below",
        .words = role_names()},
       {.key = "images",
@@ -137,9 +144,9 @@ const Settings<NetworkConfig>& network_settings() {
        .member = &NetworkConfig::device,
        .description = "`auto` (a usable GPU, else the CPU), `cpu`, `cuda`, `cuda:I`"},
       {.key = "dtype",
-       .member = &NetworkConfig::dtype,
+       .member = word_of(&NetworkConfig::dtype, dtype_from_string),
        .description = "number type of the network",
-       .words = {"float32", "bfloat16"},
+       .words = texts(dtype_names()),
        .decides = DecidedStage::predict},
       {.key = "batch",
        .member = &NetworkConfig::batch,
@@ -159,12 +166,12 @@ const Settings<NetworkConfig>& network_settings() {
 const Settings<TtaConfig>& tta_settings() {
   static const Settings<TtaConfig> kSettings{
       {.key = "objective",
-       .member = &TtaConfig::objective,
+       .member = word_of(&TtaConfig::objective, tta_objective_from_string),
        .description =
            "what adaptation minimises. `paper`: 5.0 x the auxiliary keypoints' error + 0.5 x the "
            "reprojection error, both mean absolute errors. `demo`: the squared error of the projection "
            "alone, as in the released demo",
-       .words = {"paper", "demo"},
+       .words = texts(tta_objective_names()),
        .decides = DecidedStage::refine},
       {.key = "learning_rate",
        .member = &TtaConfig::learning_rate,
@@ -299,11 +306,11 @@ const Settings<ShardConfig>& shard_settings() {
        .range = {.least = 1, .most = 65536},
        .decides = DecidedStage::predict},
       {.key = "images",
-       .member = &ShardConfig::images,
+       .member = word_of(&ShardConfig::images, manifests::image_encoding_from_string),
        .description =
            "how pictures are stored. `reference` stores no pictures, so that labels can be shared even if "
            "the pictures must not be",
-       .words = {"jpeg", "png", "reference"},
+       .words = texts(manifests::image_encoding_names()),
        .decides = DecidedStage::shards},
       {.key = "jpeg_quality",
        .member = &ShardConfig::jpeg_quality,

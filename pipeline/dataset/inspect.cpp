@@ -70,9 +70,12 @@ ordered_json describe_shard(const fs::path& path) {
                        {"final_error", sample.judgement.final_error},
                        {"picture_bytes", sample.crop.size()}});
   }
-  return {
-      {"shard", path.string()},    {"schema", shard.header.schema},         {"dataset", shard.header.dataset},
-      {"unit", shard.header.unit}, {"images", shard.header.image_encoding}, {"samples", samples}};
+  return {{"shard", path.string()},
+          {"schema", shard.header.schema},
+          {"dataset", shard.header.dataset},
+          {"unit", shard.header.unit},
+          {"images", manifests::to_string(shard.header.image_encoding)},
+          {"samples", samples}};
 }
 
 }  // namespace

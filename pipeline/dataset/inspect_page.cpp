@@ -154,7 +154,7 @@ std::string shard_page(const fs::path& path) {
   std::string text = fmt::format("{}\n", path.string());
   text += line("dataset", fmt::format("{}, unit {}", shard.header().dataset, shard.header().unit));
   text += line("schema", std::to_string(shard.header().schema));
-  text += line("pictures", shard.header().image_encoding);
+  text += line("pictures", std::string(manifests::to_string(shard.header().image_encoding)));
   text += line("samples", std::to_string(shard.rows()));
   for (std::size_t i = 0; i < std::min(kMostRows, ids.size()); ++i) text += "    " + ids[i] + '\n';
   if (ids.size() > kMostRows) {

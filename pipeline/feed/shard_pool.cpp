@@ -64,7 +64,7 @@ ShardPool::ShardPool(std::string name, const std::vector<fs::path>& sources) : n
   for (const fs::path& source : sources) {
     for (const fs::path& file : find_shards(source)) {
       const manifests::ShardReader& shard = shards_.emplace_back(file);
-      if (shard.header().image_encoding == "reference") {
+      if (shard.header().image_encoding == manifests::ImageEncoding::reference) {
         throw std::runtime_error(fmt::format(
             "{}: a shard without pictures; training needs one that was built with \"images\": \"jpeg\" or "
             "\"png\"",

@@ -79,7 +79,8 @@ model::DeviceChoice choose_device(const std::string& name) {
 
 model::TtaOptions tta_options(const config::TtaConfig& tta) {
   model::TtaOptions options;
-  options.objective = tta.objective == "demo" ? model::TtaObjective::demo : model::TtaObjective::paper;
+  options.objective =
+      tta.objective == config::TtaObjective::demo ? model::TtaObjective::demo : model::TtaObjective::paper;
   options.learning_rate = tta.learning_rate;
   options.aux_weight = tta.aux_weight;
   options.reproj_weight = tta.reproj_weight;
@@ -105,8 +106,9 @@ class TorchNetwork : public device::Network {
         adapt_batch_(static_cast<std::size_t>(tta.batch)),
         options_(tta_options(tta)),
         device_(choose_device(network.device)),
-        prima_(model::Prima::load(network.checkpoint, network.smal_asset, device_.device,
-                                  network.dtype == "bfloat16" ? torch::kBFloat16 : torch::kFloat32)) {}
+        prima_(model::Prima::load(
+            network.checkpoint, network.smal_asset, device_.device,
+            network.dtype == config::Dtype::bfloat16 ? torch::kBFloat16 : torch::kFloat32)) {}
 
   std::vector<device::BodyPrediction> predict(std::span<const device::PatchView> patches) override;
   std::vector<device::AdaptOutcome> adapt(std::span<const device::AdaptRequest> requests,

@@ -135,11 +135,11 @@ std::string predict_key(const config::BuildConfig& config, const AssetDigests& a
 }
 
 std::string crops_key(const config::ShardConfig& shards) {
-  json parts = {{"images", shards.images},
+  json parts = {{"images", manifests::to_string(shards.images)},
                 {"crop_scale", shards.crop_scale},
                 {"crop_min_side_px", shards.crop_min_side_px},
                 {"unit_size", shards.unit_size}};
-  if (shards.images == "jpeg") parts["jpeg_quality"] = shards.jpeg_quality;
+  if (shards.images == manifests::ImageEncoding::jpeg) parts["jpeg_quality"] = shards.jpeg_quality;
   return key_of("crops", kCropsCode, std::move(parts));
 }
 

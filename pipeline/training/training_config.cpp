@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <map>
+#include <span>
 
 #include "pipeline/config/config_layers.h"
 #include "pipeline/config/json_fields.h"
@@ -28,8 +29,17 @@ std::vector<std::string> texts(const json& list, const std::string& where) {
   return values;
 }
 
+// Returns the enumerator of a word. Throws ConfigError that lists the words.
+template <typename Enum>
+Enum choice(const std::string& word, std::span<const std::string_view> names,
+            Enum (*from_string)(std::string_view), const std::string& where) {
+  config::require_one_of(word, {names.begin(), names.end()}, where);
+  return from_string(word);
+}
+
 void parse_network(const json& object, const std::string& where, TrainingNetworkConfig& network) {
   std::string initial, encoders, smal_asset, priors;
+  std::string precision(to_string(network.precision));
   config::JsonFields fields(object, where);
   fields.require("initial", initial);
   fields.read("encoders", encoders);
@@ -42,10 +52,10 @@ void parse_network(const json& object, const std::string& where, TrainingNetwork
     }
   }
   fields.read("device", network.device);
-  fields.read("precision", network.precision);
+  fields.read("precision", precision);
   fields.read("compute_threads", network.compute_threads);
   fields.finish();
-  config::require_one_of(network.precision, {"auto", "float32", "bfloat16"}, where + ": precision");
+  network.precision = choice(precision, precision_names(), precision_from_string, where + ": precision");
   require(network.compute_threads >= 0, where, "\"compute_threads\" must be 0 (all cores) or more");
   network.initial = initial;
   network.encoders = encoders;
@@ -74,17 +84,19 @@ std::map<std::string, PoolConfig> parse_pools(const json& object, const std::str
 PhaseConfig parse_phase(const json& object, const std::string& where,
                         const std::map<std::string, PoolConfig>& pools) {
   PhaseConfig phase;
+  std::string objective(to_string(phase.objective));
+  std::string decay(to_string(phase.decay));
   int steps = 0;
   int warm_up_steps = 0;
   config::JsonFields fields(object, where);
   fields.require("name", phase.name);
-  fields.read("objective", phase.objective);
+  fields.read("objective", objective);
   fields.require("steps", steps);
   fields.read("ief_iterations", phase.ief_iterations);
   fields.read("adversarial", phase.adversarial);
   fields.read("learning_rate", phase.learning_rate);
   fields.read("warm_up_steps", warm_up_steps);
-  fields.read("decay", phase.decay);
+  fields.read("decay", decay);
   const json* names = fields.child("pools");
   fields.finish();
   require(names != nullptr, where, "the key \"pools\" is missing");
@@ -94,14 +106,14 @@ PhaseConfig parse_phase(const json& object, const std::string& where,
     config::require_one_of(name, known, where + ": pools");
     phase.pools.push_back(pools.at(name));
   }
-  config::require_one_of(phase.objective, {"prima", "encoders"}, where + ": objective");
+  phase.objective = choice(objective, objective_names(), objective_from_string, where + ": objective");
   require(steps >= 1, where, fmt::format("\"steps\" must be at least 1, got {}", steps));
   require(warm_up_steps >= 0 && warm_up_steps < steps, where,
           fmt::format("\"warm_up_steps\" must be 0 to less than \"steps\", got {}", warm_up_steps));
   require(phase.ief_iterations >= 1 && phase.ief_iterations <= 16, where,
           "\"ief_iterations\" must be 1 to 16");
   require(phase.learning_rate > 0.0, where, "\"learning_rate\" must be greater than 0");
-  config::require_one_of(phase.decay, {"linear", "none"}, where + ": decay");
+  phase.decay = choice(decay, decay_names(), decay_from_string, where + ": decay");
   phase.steps = steps;
   phase.warm_up_steps = warm_up_steps;
   return phase;
@@ -174,6 +186,7 @@ void parse_loss_weights(const json& object, const std::string& where, model::Los
 
 void parse_optimisation(config::JsonFields& fields, const std::string& where, TrainingConfig& config) {
   std::string variant = "sound";
+  std::string dtype(to_string(config.model_dtype));
   int checkpoint_every = static_cast<int>(config.checkpoint_every);
   int log_every = static_cast<int>(config.log_every);
   if (const json* weights = fields.child("loss_weights")) {
@@ -184,12 +197,12 @@ void parse_optimisation(config::JsonFields& fields, const std::string& where, Tr
   fields.read("weight_decay", config.weight_decay);
   fields.read("largest_gradient_norm", config.largest_gradient_norm);
   fields.read("divergence_factor", config.divergence_factor);
-  fields.read("model_dtype", config.model_dtype);
+  fields.read("model_dtype", dtype);
   fields.read("seed", config.seed);
   fields.read("checkpoint_every", checkpoint_every);
   fields.read("log_every", log_every);
   config::require_one_of(variant, {"sound", "official"}, where + ": loss_variant");
-  config::require_one_of(config.model_dtype, {"float32", "float16"}, where + ": model_dtype");
+  config.model_dtype = choice(dtype, model_dtype_names(), model_dtype_from_string, where + ": model_dtype");
   require(config.backbone_rate >= 0.0, where, "\"backbone_rate\" must be 0 or more");
   require(config.weight_decay >= 0.0, where, "\"weight_decay\" must be 0 or more");
   require(config.largest_gradient_norm >= 0.0, where,

@@ -11,6 +11,7 @@
 
 #include "model/loss_weights.h"
 #include "pipeline/feed/feed.h"
+#include "pipeline/training/training_words.h"
 
 namespace q3d::pipeline::training {
 
@@ -21,8 +22,7 @@ struct TrainingNetworkConfig {
   std::filesystem::path priors;      // safetensors with pose_prior_loss.* and shape_prior_loss.*
   std::vector<std::string> without;  // ablations: bio_features, initial_betas, keypoint_tokens
   std::string device = "auto";
-  std::string precision =
-      "float32";            // of the forward pass: float32, bfloat16, or auto: what suits the device
+  Precision precision = Precision::float32;
   int compute_threads = 0;  // 0 = all cores; can change the last bits
 };
 
@@ -35,14 +35,14 @@ struct PoolConfig {
 // A stretch of training with its own pools, rounds, optimiser and learning rate.
 struct PhaseConfig {
   std::string name;
-  std::string objective = "prima";  // or "encoders": pre-training of the two image encoders
+  Objective objective = Objective::prima;
   std::vector<PoolConfig> pools;
   std::int64_t steps = 0;
   int ief_iterations = 1;
   bool adversarial = false;
   double learning_rate = 3.75e-6;
   std::int64_t warm_up_steps = 0;
-  std::string decay = "linear";  // to zero at the last step; or "none"
+  Decay decay = Decay::linear;
 };
 
 struct TrainingConfig {
@@ -54,9 +54,9 @@ struct TrainingConfig {
   model::LossVariant loss_variant = model::LossVariant::sound;
   double backbone_rate = 0.1;  // of the learning rate, in phases with the objective "prima"
   double weight_decay = 1e-4;
-  double largest_gradient_norm = 0.0;   // 0 = no clipping
-  double divergence_factor = 20.0;      // a loss above this times its running mean stops the run
-  std::string model_dtype = "float32";  // of the finished weights' file; or float16
+  double largest_gradient_norm = 0.0;  // 0 = no clipping
+  double divergence_factor = 20.0;     // a loss above this times its running mean stops the run
+  ModelDtype model_dtype = ModelDtype::float32;
   std::uint64_t seed = 0;
   std::int64_t checkpoint_every = 500;  // steps
   std::int64_t log_every = 10;          // steps

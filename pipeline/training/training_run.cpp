@@ -103,8 +103,10 @@ model::TrainingBatch to_tensors(feed::FeedBatch&& from) {
 // The config with "auto" replaced by what suits the device. The run's key has "auto" all the same, as for the
 // device.
 TrainingConfig for_device(TrainingConfig config, torch::Device device) {
-  std::string& precision = config.network.precision;
-  if (precision == "auto") precision = model::bfloat16_is_fast(device) ? "bfloat16" : "float32";
+  Precision& precision = config.network.precision;
+  if (precision == Precision::automatic) {
+    precision = model::bfloat16_is_fast(device) ? Precision::bfloat16 : Precision::float32;
+  }
   return config;
 }
 
@@ -168,8 +170,9 @@ std::string run_key(const TrainingConfig& config, const fs::path& out, bool reme
         shards.push_back(digests.digest(file));
       pools.push_back({pool.name, shards, pool.weight});
     }
-    phases.push_back({phase.name, phase.objective, phase.steps, phase.ief_iterations, phase.adversarial,
-                      phase.learning_rate, phase.warm_up_steps, phase.decay, pools});
+    phases.push_back({phase.name, to_string(phase.objective), phase.steps, phase.ief_iterations,
+                      phase.adversarial, phase.learning_rate, phase.warm_up_steps, to_string(phase.decay),
+                      pools});
   }
   if (remember) digests.save();
   return manifests::sha256(nlohmann::json{settings, assets, phases}.dump());
@@ -181,10 +184,11 @@ model::TrainerOptions trainer_options(const TrainingConfig& config, const PhaseC
   options.variant = config.loss_variant;
   options.adamw.weight_decay = config.weight_decay;
   options.backbone_rate_scale = config.backbone_rate;
-  options.schedule = {phase.learning_rate, phase.warm_up_steps, phase.decay == "linear" ? phase.steps : 0};
+  options.schedule = {phase.learning_rate, phase.warm_up_steps,
+                      phase.decay == Decay::linear ? phase.steps : 0};
   options.largest_gradient_norm = config.largest_gradient_norm;
-  options.precision =
-      config.network.precision == "bfloat16" ? model::Precision::bfloat16 : model::Precision::float32;
+  options.precision = config.network.precision == Precision::bfloat16 ? model::Precision::bfloat16
+                                                                      : model::Precision::float32;
   options.adversarial = phase.adversarial;
   options.seed = config.seed;
   return options;
@@ -254,12 +258,13 @@ class Run {
     manifests::remove_temporaries(options.out);
     if (options.quiet) return;
     if (!device_.warning.empty()) run::log_warning(device_.warning);
-    if (config_.network.precision == "bfloat16" && !model::bfloat16_is_fast(device_.device)) {
+    if (config_.network.precision == Precision::bfloat16 && !model::bfloat16_is_fast(device_.device)) {
       run::log_warning(
           "this processor does not multiply in bfloat16 (AVX512_BF16), so convolutions in it are about ten "
           "times slower than in float32; \"precision\": \"auto\" takes the faster");
     }
-    run::log_info(fmt::format("training on {} in {}", device_.description, config_.network.precision));
+    run::log_info(
+        fmt::format("training on {} in {}", device_.description, to_string(config_.network.precision)));
     if (ranks_->size() > 1) {
       run::log_info(fmt::format("{} ranks, each with {} of a batch's {} samples", ranks_->size(),
                                 config.feed.batch / ranks_->size(), config.feed.batch));
@@ -321,7 +326,7 @@ class Run {
   std::unique_ptr<model::Learner> make_learner(const std::shared_ptr<model::PrimaNet>& net,
                                                const PhaseConfig& phase, const feed::Feed& feed) const {
     try {
-      if (phase.objective == "encoders") {
+      if (phase.objective == Objective::encoders) {
         return std::make_unique<model::EncoderTrainer>(
             net, encoder_options(config_, phase, feed.species().size()), ranks_);
       }
@@ -404,7 +409,7 @@ class Run {
     if (!leads()) return path;
     smal::tensors::NamedTensors tensors;
     model::append_parameters(tensors, "", net);
-    if (config_.model_dtype == "float16") {
+    if (config_.model_dtype == ModelDtype::float16) {
       for (auto& [name, tensor] : tensors) tensor = tensor.to(torch::kFloat16);
     }
     model::write_checkpoint(path, net.config(), tensors);

@@ -27,9 +27,10 @@ EncodedCrop encoded(std::size_t sample, const loaders::pictures::StoredCrop& cro
   result.sample = sample;
   result.side_px = crop.rgb.cols;
   result.from_image = crop.from_image;
-  if (shards.images == "reference") return result;
-  result.picture = shards.images == "png" ? loaders::pictures::encode_png(crop.rgb)
-                                          : loaders::pictures::encode_jpeg(crop.rgb, shards.jpeg_quality);
+  if (shards.images == manifests::ImageEncoding::reference) return result;
+  result.picture = shards.images == manifests::ImageEncoding::png
+                       ? loaders::pictures::encode_png(crop.rgb)
+                       : loaders::pictures::encode_jpeg(crop.rgb, shards.jpeg_quality);
   if (!crop.mask.empty()) result.mask = loaders::pictures::encode_png(crop.mask);
   return result;
 }

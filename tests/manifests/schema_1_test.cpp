@@ -82,7 +82,7 @@ TEST_F(Schema1, Header) {
   EXPECT_EQ(shard_.header.dataset, "quadruped3d");
   EXPECT_EQ(shard_.header.version, "0123456789ab");
   EXPECT_EQ(shard_.header.unit, 42);
-  EXPECT_EQ(shard_.header.image_encoding, "png");
+  EXPECT_EQ(shard_.header.image_encoding, ImageEncoding::png);
 }
 
 TEST_F(Schema1, Records) {

@@ -96,7 +96,7 @@ inline manifests::ShardHeader make_shard_header() {
   header.dataset = "quadruped3d";
   header.version = "0123456789ab";
   header.unit = 42;
-  header.image_encoding = "png";
+  header.image_encoding = manifests::ImageEncoding::png;
   return header;
 }
 

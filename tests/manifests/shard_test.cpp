@@ -109,7 +109,7 @@ TEST_F(ShardTest, ReadsBackEverythingButAbsolutePaths) {
   EXPECT_EQ(shard.header.dataset, "quadruped3d");
   EXPECT_EQ(shard.header.version, "0123456789ab");
   EXPECT_EQ(shard.header.unit, 42);
-  EXPECT_EQ(shard.header.image_encoding, "png");
+  EXPECT_EQ(shard.header.image_encoding, ImageEncoding::png);
   const auto expected = testing::make_shard_samples();
   ASSERT_EQ(shard.samples.size(), expected.size());
   for (std::size_t row = 0; row < expected.size(); ++row) {
@@ -150,7 +150,7 @@ TEST_F(ShardTest, ReadsRowRanges) {
 
 TEST_F(ShardTest, ReferenceShardsHoldNoPictures) {
   auto header = testing::make_shard_header();
-  header.image_encoding = "reference";
+  header.image_encoding = ImageEncoding::reference;
   auto samples = testing::make_shard_samples();
   EXPECT_THROW(write_shard(path_, header, samples), std::invalid_argument);
   for (auto& sample : samples) {
@@ -158,7 +158,7 @@ TEST_F(ShardTest, ReferenceShardsHoldNoPictures) {
     sample.crop_mask.clear();
   }
   write_shard(path_, header, samples);
-  EXPECT_EQ(read_shard(path_).header.image_encoding, "reference");
+  EXPECT_EQ(read_shard(path_).header.image_encoding, ImageEncoding::reference);
   EXPECT_THROW(write_shard(path_, testing::make_shard_header(), samples), std::invalid_argument);
 }
 
@@ -169,7 +169,7 @@ TEST_F(ShardTest, RefusesFailedRecordsAndUnknownHeaders) {
               ThrowsMessage<std::invalid_argument>(
                   AllOf(HasSubstr(samples[1].record.id), HasSubstr("image_missing"))));
   auto header = testing::make_shard_header();
-  header.image_encoding = "webp";
+  header.schema = kShardSchema + 1;
   EXPECT_THROW(write_shard(path_, header, {}), std::invalid_argument);
   EXPECT_FALSE(fs::exists(path_));
 }

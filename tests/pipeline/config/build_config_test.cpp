@@ -41,9 +41,9 @@ TEST(BuildConfig, ReadsEveryKey) {
   EXPECT_EQ(config.datasets[0].split, "train");
   EXPECT_EQ(config.network.batch, 4);
   EXPECT_EQ(config.network.compute_threads, 1);
-  EXPECT_EQ(config.tta.objective, "demo");
+  EXPECT_EQ(config.tta.objective, TtaObjective::demo);
   EXPECT_EQ(config.tta.iterations_max, 6);
-  EXPECT_EQ(config.shards.images, "png");
+  EXPECT_EQ(config.shards.images, manifests::ImageEncoding::png);
   EXPECT_DOUBLE_EQ(config.shards.crop_scale, 2.0);
   EXPECT_DOUBLE_EQ(config.calibrate.refined, 0.25);
   EXPECT_TRUE(config.calibrate.per_dataset);

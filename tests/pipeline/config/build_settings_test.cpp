@@ -31,10 +31,10 @@ void expect_round_trip(const Settings<Struct>& settings, const Struct& config) {
 
 TEST(Settings, DefaultsAndOtherValuesRoundTrip) {
   expect_round_trip(network_settings(), NetworkConfig{});
-  expect_round_trip(network_settings(), NetworkConfig{"c", "s", "cpu", "bfloat16", 3, 2});
+  expect_round_trip(network_settings(), NetworkConfig{"c", "s", "cpu", Dtype::bfloat16, 3, 2});
   expect_round_trip(tta_settings(), TtaConfig{});
-  expect_round_trip(tta_settings(), TtaConfig{"demo", 0.25, 1.0, 2.0, 3, 4, 5});
-  expect_round_trip(shard_settings(), ShardConfig{8, "reference", 1, 4.0, 256});
+  expect_round_trip(tta_settings(), TtaConfig{TtaObjective::demo, 0.25, 1.0, 2.0, 3, 4, 5});
+  expect_round_trip(shard_settings(), ShardConfig{8, manifests::ImageEncoding::reference, 1, 4.0, 256});
   GuardConfig guards;
   guards.visible_min = 26;
   guards.held_out_seed = 18446744073709551615U;

@@ -50,9 +50,12 @@ json write_shards(const fs::path& folder, std::string& digests) {
     const std::string name = "shards/00000" + std::to_string(unit) + ".h5";
     const fs::path file = folder / name;
     const std::string id = unit == 0 ? "zoo/train/a.jpg#0" : "zoo/train/d.jpg#3";
-    const std::string digest = manifests::write_shard(
-        file, {.dataset = "made", .version = "1.0.0", .unit = unit, .image_encoding = "reference"},
-        {flat_sample(id)});
+    const std::string digest = manifests::write_shard(file,
+                                                      {.dataset = "made",
+                                                       .version = "1.0.0",
+                                                       .unit = unit,
+                                                       .image_encoding = manifests::ImageEncoding::reference},
+                                                      {flat_sample(id)});
     digests += digest + '\n';
     list.push_back(
         {{"file", name}, {"unit", unit}, {"rows", 1}, {"bytes", fs::file_size(file)}, {"sha256", digest}});

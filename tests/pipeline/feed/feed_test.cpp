@@ -69,7 +69,7 @@ TEST_F(FeedTest, ShardsThatCannotTrainAreNamed) {
   bare.crop.clear();
   bare.crop_side_px = 0;
   manifests::ShardHeader header;
-  header.image_encoding = "reference";
+  header.image_encoding = manifests::ImageEncoding::reference;
   manifests::write_shard(scratch_.path() / "reference.h5", header, {bare});
   try {
     ShardPool("x", {scratch_.path() / "reference.h5"});
@@ -199,7 +199,7 @@ TEST_F(FeedTest, ADamagedPictureNamesItsSample) {
   broken.crop.resize(broken.crop.size() / 3);
   std::fill(broken.crop.begin(), broken.crop.begin() + 8, std::byte{0});
   manifests::ShardHeader header;
-  header.image_encoding = "png";
+  header.image_encoding = manifests::ImageEncoding::png;
   manifests::write_shard(scratch_.path() / "broken.h5", header, {broken});
   std::vector<ShardPool> pools;
   pools.emplace_back("bad", std::vector<std::filesystem::path>{scratch_.path() / "broken.h5"});

@@ -63,7 +63,7 @@ void write_sample_shard(const std::filesystem::path& path, const std::string& na
   manifests::ShardHeader header;
   header.dataset = name;
   header.version = "v";
-  header.image_encoding = "png";
+  header.image_encoding = manifests::ImageEncoding::png;
   manifests::write_shard(path, header, samples);
 }
 

@@ -90,7 +90,7 @@ TEST(StageKeys, WhatDecidesPredictionsIsInTheirKey) {
   EXPECT_NE(before, changed([](Inputs& i) { i.assets.smal_asset = "x"; }));
   EXPECT_NE(before, changed([](Inputs& i) { i.device = "cpu-1"; }));
   EXPECT_NE(before, changed([](Inputs& i) { i.config.network.batch = 3; }));
-  EXPECT_NE(before, changed([](Inputs& i) { i.config.network.dtype = "bfloat16"; }));
+  EXPECT_NE(before, changed([](Inputs& i) { i.config.network.dtype = config::Dtype::bfloat16; }));
   EXPECT_NE(before, changed([](Inputs& i) { i.config.shards.unit_size = 3; }));
   EXPECT_EQ(before, changed([](Inputs& i) { i.config.tta.learning_rate = 3; }));
   EXPECT_EQ(before, changed([](Inputs& i) { i.config.datasets[0].root = "elsewhere"; }));
@@ -117,7 +117,7 @@ TEST(StageKeys, WhatDecidesTheBytesOfStoredCropsAndNothingElseIsInTheirKey) {
     return other.keys().crops != before;
   };
   EXPECT_TRUE(changed([](Inputs& i) { i.config.shards.jpeg_quality = 50; }));
-  EXPECT_TRUE(changed([](Inputs& i) { i.config.shards.images = "png"; }));
+  EXPECT_TRUE(changed([](Inputs& i) { i.config.shards.images = manifests::ImageEncoding::png; }));
   EXPECT_TRUE(changed([](Inputs& i) { i.config.shards.crop_scale = 2.5; }));
   EXPECT_TRUE(changed([](Inputs& i) { i.config.shards.crop_min_side_px = 300; }));
   EXPECT_TRUE(changed([](Inputs& i) { i.config.shards.unit_size = 3; }));
@@ -126,7 +126,7 @@ TEST(StageKeys, WhatDecidesTheBytesOfStoredCropsAndNothingElseIsInTheirKey) {
   EXPECT_FALSE(changed([](Inputs& i) { i.config.datasets[0].role = config::Role::truth; }));
   EXPECT_FALSE(changed([](Inputs& i) { i.config.name = "another"; }));
   Inputs png;
-  png.config.shards.images = "png";
+  png.config.shards.images = manifests::ImageEncoding::png;
   Inputs quality = png;
   quality.config.shards.jpeg_quality = 50;
   EXPECT_EQ(png.keys().crops, quality.keys().crops) << "a PNG has no quality";

@@ -33,7 +33,7 @@ json good() {
 TEST(TrainingConfig, ReadsEveryKey) {
   const TrainingConfig config = parse_training_config(good(), "t", "1");
   EXPECT_EQ(config.network.encoders, "e.safetensors");
-  EXPECT_EQ(config.network.precision, "bfloat16");
+  EXPECT_EQ(config.network.precision, Precision::bfloat16);
   EXPECT_EQ(config.network.compute_threads, 2);
   ASSERT_EQ(config.phases.size(), 2U);
   const PhaseConfig& warm_up = config.phases[0];
@@ -43,7 +43,7 @@ TEST(TrainingConfig, ReadsEveryKey) {
   EXPECT_TRUE(warm_up.adversarial);
   EXPECT_DOUBLE_EQ(warm_up.learning_rate, 0.01);
   EXPECT_EQ(warm_up.warm_up_steps, 2);
-  EXPECT_EQ(warm_up.decay, "none");
+  EXPECT_EQ(warm_up.decay, Decay::none);
   ASSERT_EQ(config.phases[1].pools.size(), 2U);
   EXPECT_EQ(config.phases[1].ief_iterations, 1);
   EXPECT_DOUBLE_EQ(config.phases[1].pools[1].weight, 0.5);
@@ -74,7 +74,7 @@ TEST(TrainingConfig, DefaultsAreTheOfficialOnes) {
   EXPECT_DOUBLE_EQ(parsed.weight_decay, 1e-4);
   EXPECT_DOUBLE_EQ(parsed.largest_gradient_norm, 0.0);
   EXPECT_DOUBLE_EQ(parsed.phases[1].learning_rate, 3.75e-6);
-  EXPECT_EQ(parsed.phases[1].decay, "linear");
+  EXPECT_EQ(parsed.phases[1].decay, Decay::linear);
   EXPECT_EQ(parsed.loss_variant, model::LossVariant::sound);
 }
 
@@ -116,6 +116,8 @@ INSTANTIATE_TEST_SUITE_P(
         Mutation{"/stages/1/0/warm_up_steps", "10", "less than \"steps\""},
         Mutation{"/stages/1/0/ief_iterations", "0", "1 to 16"},
         Mutation{"/stages/1/0/learning_rate", "0", "greater than 0"},
+        Mutation{"/stages/1/0/objective", "\"pima\"", "Did you mean \"prima\"?"},
+        Mutation{"/model_dtype", "\"bfloat16\"", "float32, float16"},
         Mutation{"/stages/1/0/decay", "\"cosine\"", "linear, none"},
         Mutation{"/stages/1/0/stps", "1", "did you mean \"steps\"?"},
         Mutation{"/feed_ahead", "-1", "0 to 64"}, Mutation{"/keypoint_weight", "\"v\"", "label, raw_v"},

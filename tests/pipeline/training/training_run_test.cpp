@@ -39,8 +39,8 @@ class TrainingRun : public ::testing::Test {
     config_.network.compute_threads = 1;
     const PoolConfig first{"first", {path("first.h5")}, 1.0};
     const PoolConfig second{"second", {path("second.h5")}, 0.15};
-    config_.phases = {{"warm-up", "prima", {first}, 3, 2, true, 1e-3, 1, "linear"},
-                      {"joint", "prima", {first, second}, 3, 1, false, 1e-3, 0, "linear"}};
+    config_.phases = {{"warm-up", Objective::prima, {first}, 3, 2, true, 1e-3, 1, Decay::linear},
+                      {"joint", Objective::prima, {first, second}, 3, 1, false, 1e-3, 0, Decay::linear}};
     config_.feed.batch = 2;
     config_.seed = 17;
     config_.checkpoint_every = 2;
@@ -78,7 +78,7 @@ TEST_F(TrainingRun, StoppedAnywhereItEndsWithTheSameWeights) {
 
 TEST_F(TrainingRun, EncodersAreTrainedAloneAndResume) {
   const PoolConfig first{"first", {path("first.h5")}, 1.0};
-  config_.phases = {{"encoders", "encoders", {first}, 4, 1, false, 1e-3, 1, "linear"}};
+  config_.phases = {{"encoders", Objective::encoders, {first}, 4, 1, false, 1e-3, 1, Decay::linear}};
   const TrainingSummary straight = run("straight");
   run("stopped", 1);
   EXPECT_EQ(manifests::read_file(straight.model), manifests::read_file(run("stopped").model));
@@ -93,8 +93,15 @@ TEST_F(TrainingRun, EncodersAreTrainedAloneAndResume) {
 
 TEST_F(TrainingRun, OneSpeciesCannotBeTold) {
   testing::write_sample_shard(path("single.h5"), "single", 1, 1);
-  config_.phases = {
-      {"encoders", "encoders", {{"single", {path("single.h5")}, 1.0}}, 4, 1, false, 1e-3, 0, "linear"}};
+  config_.phases = {{"encoders",
+                     Objective::encoders,
+                     {{"single", {path("single.h5")}, 1.0}},
+                     4,
+                     1,
+                     false,
+                     1e-3,
+                     0,
+                     Decay::linear}};
   EXPECT_THROW(run("out"), run::ConfigError);
 }
 
@@ -178,7 +185,7 @@ TEST_F(TrainingRun, ALossThatIsNotFiniteNamesTheSamples) {
   manifests::ShardSample bad = testing::shard_sample("poison/0", 5, true);
   bad.body.betas[3] = std::numeric_limits<float>::infinity();
   manifests::ShardHeader header;
-  header.image_encoding = "png";
+  header.image_encoding = manifests::ImageEncoding::png;
   manifests::write_shard(path("poison.h5"), header, {bad});
   config_.phases[0].pools.push_back({"poison", {path("poison.h5")}, 1000.0});
   try {

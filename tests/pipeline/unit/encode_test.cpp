@@ -25,7 +25,7 @@ struct DecodedUnit {
   UnitWork work;
 
   DecodedUnit() {
-    shards.images = "png";
+    shards.images = manifests::ImageEncoding::png;
     set_candidates(work, candidates);
     set_predictions(work, std::vector<PredictedSample>(4));
     work.refined.emplace();
@@ -93,7 +93,7 @@ TEST(EncodeCrops, AUnitWhoseShardIsThereNeedsNone) {
 
 TEST(EncodeCrops, AReferenceHasNoBytes) {
   DecodedUnit unit;
-  unit.shards.images = "reference";
+  unit.shards.images = manifests::ImageEncoding::reference;
   unit.keep({2});
   encode_crops(unit.work, unit.shards);
   EXPECT_TRUE(find_crop(unit.work, 2)->picture.empty());
