@@ -16,7 +16,7 @@ namespace q3d::manifests {
 
 using smal::kNumBetas;
 using smal::kNumJoints;
-using smal::kNumKeypoints;  // of Animal3D, which are SMAL's
+using smal::kNumKeypoints;  // of Animal3D: those of SMAL
 
 // One annotated keypoint, in pixels of the source image as stored (EXIF orientation is never applied), with
 // the origin at the top left. `v` is the file's own value, unchanged (-1, 0, 1, 2, or a likelihood). `weight`

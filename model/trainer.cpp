@@ -8,6 +8,7 @@
 #include "model/assemble.h"
 #include "model/mixed_precision.h"
 #include "model/module_state.h"
+#include "smal/camera.h"
 
 namespace q3d::model {
 namespace {
@@ -52,7 +53,7 @@ void check_batch(const TrainingBatch& batch, const Priors& priors) {
   check_targets(batch.targets);
   const std::int64_t size = batch.targets.family.size(0);
   require(size > 0, "the batch is empty");
-  require(batch.images.sizes() == at::IntArrayRef({size, 3, 256, 256}) &&
+  require(batch.images.sizes() == at::IntArrayRef({size, 3, smal::kCropSidePx, smal::kCropSidePx}) &&
               batch.images.scalar_type() == torch::kFloat32,
           fmt::format("images: expected ({}, 3, 256, 256) float32, got {} dimensions, {} numbers", size,
                       batch.images.dim(), batch.images.numel()));

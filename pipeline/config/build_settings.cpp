@@ -2,6 +2,8 @@
 
 #include "filters/near_duplicates.h"
 #include "pipeline/config/profiles.h"
+#include "smal/camera.h"
+#include "smal/sizes.h"
 
 namespace q3d::pipeline::config {
 namespace {
@@ -238,7 +240,7 @@ const Settings<GuardConfig>& guard_settings() {
       {.key = "visible_min",
        .member = &GuardConfig::visible_min,
        .description = "discards labels with fewer visible keypoints than this (`too_few_keypoints`)",
-       .range = {.least = 0, .most = 26}},
+       .range = {.least = 0, .most = smal::kNumKeypoints}},
       {.key = "iterations_full_at",
        .member = &GuardConfig::iterations_full_at,
        .description =
@@ -246,7 +248,7 @@ const Settings<GuardConfig>& guard_settings() {
            "/ `iterations_full_at` of its iterations (rounded, at least 1), and all of them from "
            "`iterations_full_at` keypoints on. A sample that misses the gain is discarded as "
            "`scaled_gain_too_small` if it had fewer than the gain's ten iterations",
-       .range = {.least = 0, .most = 26}},
+       .range = {.least = 0, .most = smal::kNumKeypoints}},
       {.key = "held_out_share",
        .member = &GuardConfig::held_out_share,
        .description =
@@ -327,7 +329,7 @@ const Settings<ShardConfig>& shard_settings() {
       {.key = "crop_min_side_px",
        .member = &ShardConfig::crop_min_side_px,
        .description = "side of the stored crop in pixels, unless the source has fewer pixels there",
-       .range = {.least = 256, .most = 2048},
+       .range = {.least = smal::kCropSidePx, .most = 2048},
        .decides = DecidedStage::shards}};
   return kSettings;
 }
