@@ -33,9 +33,9 @@ torch::Tensor parameter_loss(const torch::Tensor& predicted, const torch::Tensor
   return ((predicted - target).square().flatten(1).sum(1) * has).sum();
 }
 
-torch::Tensor axis_angles(const torch::Tensor& rotations, LossVariant variant) {
-  return (variant == LossVariant::official ? smal::tensors::matrix_to_axis_angle(rotations)
-                                           : smal::tensors::matrix_to_axis_angle_smooth(rotations))
+torch::Tensor axis_angles(const torch::Tensor& rotations, settings::LossVariant variant) {
+  return (variant == settings::LossVariant::official ? smal::tensors::matrix_to_axis_angle(rotations)
+                                                     : smal::tensors::matrix_to_axis_angle_smooth(rotations))
       .flatten(1);
 }
 
@@ -89,7 +89,7 @@ PartialMean contrastive_loss(const torch::Tensor& features, const torch::Tensor&
 }
 
 LossTerms loss_terms(const Prediction& prediction, const Targets& targets, const Priors& priors,
-                     LossVariant variant, const ranks::Collective& ranks) {
+                     settings::LossVariant variant, const ranks::Collective& ranks) {
   LossTerms terms;
   terms.keypoints_2d = keypoint_loss(prediction.keypoints_2d, targets.keypoints_2d);
   terms.keypoints_3d = centred_keypoint_loss(prediction.keypoints_3d, targets.keypoints_3d);
@@ -115,7 +115,7 @@ LossTerms loss_terms(const Prediction& prediction, const Targets& targets, const
   return terms;
 }
 
-torch::Tensor total_loss(const LossTerms& terms, const LossWeights& weights) {
+torch::Tensor total_loss(const LossTerms& terms, const settings::LossWeights& weights) {
   return weights.keypoints_3d * terms.keypoints_3d + weights.keypoints_2d * terms.keypoints_2d +
          weights.aux_keypoints_2d * terms.aux_keypoints_2d +
          weights.aux_keypoints_3d * terms.aux_keypoints_3d +

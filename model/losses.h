@@ -6,11 +6,11 @@
 
 #include <torch/torch.h>
 
-#include "model/loss_weights.h"
 #include "model/partial_mean.h"
 #include "model/prima.h"
 #include "model/priors.h"
 #include "model/ranks/collective.h"
+#include "model/settings/loss_weights.h"
 
 namespace q3d::model {
 
@@ -40,12 +40,12 @@ struct LossTerms {
 };
 
 LossTerms loss_terms(const Prediction& prediction, const Targets& targets, const Priors& priors,
-                     LossVariant variant, const ranks::Collective& ranks = *ranks::single_rank());
+                     settings::LossVariant variant, const ranks::Collective& ranks = *ranks::single_rank());
 
 // The weighted sum without the adversarial term. The pose prior, halved, counts with the weights of the
 // global orientation and of the pose; the shape priors with that of the betas, the one of the initial betas
 // halved.
-torch::Tensor total_loss(const LossTerms& terms, const LossWeights& weights);
+torch::Tensor total_loss(const LossTerms& terms, const settings::LossWeights& weights);
 
 // Sum over keypoints and axes of weight * |predicted - true|. predicted (B, 26, D), target (B, 26, D + 1).
 torch::Tensor keypoint_loss(const torch::Tensor& predicted, const torch::Tensor& target);

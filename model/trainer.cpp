@@ -154,7 +154,7 @@ torch::Tensor Trainer::step_discriminator(const Prediction& prediction, const Ta
   const torch::Tensor predicted =
       discriminator_->forward(body_joints(prediction.rotations).detach(), prediction.betas.detach());
   const torch::Tensor real = discriminator_->forward(body_joints(targets.rotations), targets.betas);
-  const torch::Tensor is_real = options_.variant == LossVariant::official
+  const torch::Tensor is_real = options_.variant == settings::LossVariant::official
                                     ? torch::ones_like(targets.has_pose)
                                     : targets.has_pose * targets.has_betas;
   const torch::Tensor loss = discriminator_loss(predicted, real, is_real);

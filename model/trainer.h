@@ -19,8 +19,8 @@
 namespace q3d::model {
 
 struct TrainerOptions {
-  LossWeights weights;
-  LossVariant variant = LossVariant::sound;
+  settings::LossWeights weights;
+  settings::LossVariant variant = settings::LossVariant::sound;
   AdamWOptions adamw;
   double backbone_rate_scale = kBackboneRateScale;  // of the schedule's rate
   RateSchedule schedule;

@@ -63,7 +63,7 @@ Command add_train(CLI::App& app) {
       "and the state.");
   return [arguments] {
     const training::TrainingSummary summary = training::train(
-        training::load_training_config(arguments->configs, arguments->stage), arguments->options);
+        training::settings::load_training_config(arguments->configs, arguments->stage), arguments->options);
     if (summary.rank != 0) return 0;  // rank 0 speaks for all
     print_summary(summary);
     if (arguments->json) fmt::print("{}\n", to_json(summary).dump());

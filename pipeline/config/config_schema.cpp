@@ -1,39 +1,12 @@
 #include "pipeline/config/config_schema.h"
 
 #include "pipeline/config/build_settings.h"
+#include "pipeline/config/setting_schema.h"
 
 namespace q3d::pipeline::config {
 namespace {
 
 using nlohmann::ordered_json;
-
-ordered_json schema_of(const SettingFacts& facts) {
-  ordered_json schema{{"description", facts.description}, {"type", facts.type}};
-  if (!facts.words.empty()) schema["enum"] = facts.words;
-  if (facts.range.least) {
-    schema[facts.range.is_open_below ? "exclusiveMinimum" : "minimum"] = *facts.range.least;
-  }
-  if (facts.range.most)
-    schema[facts.range.is_open_above ? "exclusiveMaximum" : "maximum"] = *facts.range.most;
-  if (!facts.value.is_null()) schema["default"] = facts.value;
-  return schema;
-}
-
-ordered_json object_schema(const std::vector<SettingFacts>& settings) {
-  ordered_json schema{
-      {"type", "object"}, {"properties", ordered_json::object()}, {"additionalProperties", false}};
-  for (const SettingFacts& facts : settings) schema["properties"][facts.key] = schema_of(facts);
-  return schema;
-}
-
-// The same where the keys without a default must be there.
-ordered_json whole_object_schema(const std::vector<SettingFacts>& settings) {
-  ordered_json schema = object_schema(settings);
-  for (const SettingFacts& facts : settings) {
-    if (facts.is_required) schema["required"].push_back(facts.key);
-  }
-  return schema;
-}
 
 ordered_json datasets_schema() {
   std::vector<SettingFacts> settings = facts_of(dataset_settings());
@@ -72,10 +45,7 @@ ordered_json build_config_schema() {
   properties["shards"] = object_schema(facts_of(shard_settings()));
   properties["leakage"] = leakage_schema();
   properties["calibrate"] = object_schema(facts_of(calibrate_settings()));
-  ordered_json document{{"$schema", "https://json-schema.org/draft/2020-12/schema"},
-                        {"title", "A build's config of quadruped3d"}};
-  document.update(schema);
-  return document;
+  return schema_document("A build's config of quadruped3d", schema);
 }
 
 }  // namespace q3d::pipeline::config

@@ -109,4 +109,15 @@ void JsonFields::assign(const std::string& key, const nlohmann::json& json, doub
   value = json.get<double>();
 }
 
+void JsonFields::assign(const std::string& key, const nlohmann::json& json,
+                        std::vector<std::string>& value) const {
+  const char* const expected = "a list of strings with at least one";
+  if (!json.is_array() || json.empty()) fail(key, json, expected);
+  value.clear();
+  for (const nlohmann::json& text : json) {
+    if (!text.is_string()) fail(key, json, expected);
+    value.push_back(text.get<std::string>());
+  }
+}
+
 }  // namespace q3d::pipeline::config

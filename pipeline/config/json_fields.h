@@ -53,6 +53,7 @@ class JsonFields {
   void assign(const std::string& key, const nlohmann::json& json, int& value) const;
   void assign(const std::string& key, const nlohmann::json& json, std::uint64_t& value) const;
   void assign(const std::string& key, const nlohmann::json& json, double& value) const;
+  void assign(const std::string& key, const nlohmann::json& json, std::vector<std::string>& value) const;
   [[noreturn]] void fail(const std::string& key, const nlohmann::json& json, const char* expected) const;
 
   const nlohmann::json& object_;

@@ -23,4 +23,11 @@ void check_range(const Range& range, double value, const std::string& key, const
   throw run::ConfigError(fmt::format("{}: \"{}\" must be {}, got {}", where, key, range.text(), value));
 }
 
+void check_words(const std::vector<std::string>& words, const nlohmann::ordered_json& value,
+                 const std::string& where) {
+  if (value.is_string()) require_one_of(value.get<std::string>(), words, where);
+  if (!value.is_array()) return;
+  for (const nlohmann::ordered_json& word : value) require_one_of(word.get<std::string>(), words, where);
+}
+
 }  // namespace q3d::pipeline::config

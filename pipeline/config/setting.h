@@ -19,8 +19,9 @@
 
 namespace q3d::pipeline::config {
 
-// The stage whose results a setting decides. `elsewhere`: none, or in a way that stages.cpp spells out.
-enum class DecidedStage : std::uint8_t { elsewhere, predict, refine, shards };
+// The results that a setting decides: those of a stage, or the weights of a training run. `elsewhere`: none,
+// or in a way that the code which makes the key spells out.
+enum class DecidedStage : std::uint8_t { elsewhere, predict, refine, shards, weights };
 
 // A member that is written as a word, such as an enum. `set` is called with a word of the setting's list.
 template <typename Struct>
@@ -42,14 +43,15 @@ struct Range {
 
 template <typename Struct>
 struct Setting {
-  using Member = std::variant<bool Struct::*, int Struct::*, std::uint64_t Struct::*, double Struct::*,
-                              std::optional<double> Struct::*, std::string Struct::*,
-                              std::filesystem::path Struct::*, Word<Struct>>;
+  using Member =
+      std::variant<bool Struct::*, int Struct::*, std::uint64_t Struct::*, double Struct::*,
+                   std::optional<double> Struct::*, std::string Struct::*, std::filesystem::path Struct::*,
+                   std::vector<std::string> Struct::*, Word<Struct>>;
   const char* key;
   Member member;
   const char* description;  // Markdown; a sentence or more, without the range and the default
   Range range{};
-  std::vector<std::string> words{};  // allowed texts; empty allows any
+  std::vector<std::string> words{};  // allowed texts, of a list too; empty allows any
   bool is_required = false;
   DecidedStage decides = DecidedStage::elsewhere;
 };
@@ -59,7 +61,7 @@ using Settings = std::vector<Setting<Struct>>;
 // What the schema and the page say of a setting, without its struct.
 struct SettingFacts {
   std::string key;
-  std::string type;              // of JSON Schema: boolean, integer, number, string
+  std::string type;              // of JSON Schema: boolean, integer, number, string, array (of strings)
   nlohmann::ordered_json value;  // null where the default is absent or empty
   std::string description;
   Range range;
@@ -69,6 +71,10 @@ struct SettingFacts {
 
 // Throws ConfigError naming key, got and expected.
 void check_range(const Range& range, double value, const std::string& key, const std::string& where);
+
+// Throws ConfigError unless the text, or each text of the list, is one of the words.
+void check_words(const std::vector<std::string>& words, const nlohmann::ordered_json& value,
+                 const std::string& where);
 
 // The value as the config file writes it; null for an absent number and an empty path.
 template <typename Struct>
@@ -112,9 +118,7 @@ void read_setting(JsonFields& fields, const Setting<Struct>& setting, Struct& co
       setting.member);
   const nlohmann::ordered_json value = value_of(setting, config);
   if (value.is_number()) check_range(setting.range, value.get<double>(), setting.key, fields.where());
-  if (value.is_string() && !setting.words.empty()) {
-    require_one_of(value.get<std::string>(), setting.words, fields.where() + ": " + setting.key);
-  }
+  if (!setting.words.empty()) check_words(setting.words, value, fields.where() + ": " + setting.key);
 }
 
 // Reads every setting of the table. Throws ConfigError.
@@ -162,11 +166,14 @@ std::vector<SettingFacts> facts_of(const Settings<Struct>& settings) {
                         std::is_same_v<Member, std::optional<double> Struct::*>) {
             return "number";
           }
+          if constexpr (std::is_same_v<Member, std::vector<std::string> Struct::*>) return "array";
           return "string";
         },
         setting.member);
     fact.value = value_of(setting, Struct{});
-    if (fact.value.is_string() && fact.value.template get<std::string>().empty()) fact.value = nullptr;
+    const bool is_text = fact.value.is_string();
+    if (fact.value == (is_text ? nlohmann::ordered_json("") : nlohmann::ordered_json::array()))
+      fact.value = nullptr;
     fact.description = setting.description;
     fact.range = setting.range;
     fact.words = setting.words;

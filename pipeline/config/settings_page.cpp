@@ -1,6 +1,6 @@
 #include "pipeline/config/settings_page.h"
 
-#include <map>
+#include <algorithm>
 #include <stdexcept>
 
 #include "pipeline/config/build_settings.h"
@@ -25,32 +25,42 @@ std::string limits_text(const SettingFacts& facts) {
   return text.empty() ? facts.range.text() : text;
 }
 
+std::string type_text(const SettingFacts& facts) {
+  return facts.type == "array" ? "list of strings" : facts.type;
+}
+
 std::string table(const std::vector<SettingFacts>& settings) {
   std::string text = "| key | type | default | values | meaning |\n|---|---|---|---|---|\n";
   for (const SettingFacts& facts : settings) {
-    text += fmt::format("| `{}` | {} | {} | {} | {} |\n", facts.key, facts.type, default_text(facts),
+    text += fmt::format("| `{}` | {} | {} | {} | {} |\n", facts.key, type_text(facts), default_text(facts),
                         limits_text(facts), facts.description);
   }
   return text;
 }
 
-std::map<std::string, std::string> tables() {
-  return {{"build", table(facts_of(build_settings()))},
-          {"datasets", table(facts_of(dataset_settings()))},
-          {"own labels", table(facts_of(own_label_settings()))},
-          {"network", table(facts_of(network_settings()))},
-          {"tta", table(facts_of(tta_settings()))},
-          {"filter", table(facts_of(filter_settings()))},
-          {"guards", table(facts_of(guard_settings()))},
-          {"shards", table(facts_of(shard_settings()))},
-          {"leakage", table(facts_of(leakage_settings()))},
-          {"calibrate", table(facts_of(calibrate_settings()))}};
-}
-
 }  // namespace
 
-std::string with_settings_tables(const std::string& page) {
-  std::map<std::string, std::string> missing = tables();
+SettingsTables build_settings_tables() {
+  return {{"build", facts_of(build_settings())},
+          {"datasets", facts_of(dataset_settings())},
+          {"own labels", facts_of(own_label_settings())},
+          {"network", facts_of(network_settings())},
+          {"tta", facts_of(tta_settings())},
+          {"filter", facts_of(filter_settings())},
+          {"guards", facts_of(guard_settings())},
+          {"shards", facts_of(shard_settings())},
+          {"leakage", facts_of(leakage_settings())},
+          {"calibrate", facts_of(calibrate_settings())}};
+}
+
+bool has_settings_table(const std::string& page, const SettingsTables& tables) {
+  return std::any_of(tables.begin(), tables.end(), [&](const auto& entry) {
+    return page.find(kBegin + entry.first + kEndOfBegin) != std::string::npos;
+  });
+}
+
+std::string with_settings_tables(const std::string& page, const SettingsTables& tables) {
+  SettingsTables missing = tables;
   std::string result;
   std::size_t at = 0;
   while (true) {
@@ -64,7 +74,7 @@ std::string with_settings_tables(const std::string& page) {
     const std::string name = page.substr(begin + kBegin.size(), after_name - begin - kBegin.size());
     const auto found = missing.find(name);
     if (found == missing.end()) throw std::runtime_error("no settings are called \"" + name + "\", or twice");
-    result += page.substr(at, after_name + kEndOfBegin.size() - at) + found->second + kEnd;
+    result += page.substr(at, after_name + kEndOfBegin.size() - at) + table(found->second) + kEnd;
     missing.erase(found);
     at = end + kEnd.size();
   }

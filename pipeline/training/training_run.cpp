@@ -40,6 +40,14 @@ namespace q3d::pipeline::training {
 namespace {
 
 namespace fs = std::filesystem;
+using settings::Decay;
+using settings::ModelDtype;
+using settings::Objective;
+using settings::PhaseConfig;
+using settings::PoolConfig;
+using settings::Precision;
+using settings::TrainingConfig;
+using settings::TrainingNetworkConfig;
 using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point start) {
@@ -100,8 +108,8 @@ model::TrainingBatch to_tensors(feed::FeedBatch&& from) {
   return result;
 }
 
-// The config with "auto" replaced by what suits the device. The run's key has "auto" all the same, as for the
-// device.
+// The config with the precision "auto" replaced by what suits the device. The run's key keeps "auto", as it
+// keeps no device.
 TrainingConfig for_device(TrainingConfig config, torch::Device device) {
   Precision& precision = config.network.precision;
   if (precision == Precision::automatic) {
@@ -147,35 +155,31 @@ std::shared_ptr<model::PrimaNet> initial_net(const TrainingNetworkConfig& networ
   return net;
 }
 
-// What decides the weights, but for device and threads: assets, pools and the config without the keys that
-// only steer the run. `remember`: keep the digests in `out` for the next run.
+std::vector<fs::path> paths(const PoolConfig& pool) {
+  return {pool.shards.begin(), pool.shards.end()};
+}
+
+// A digest over all that decides the weights, but for device and threads: effective settings, assets and
+// shards. `remember`: keep the files' digests in `out` for the next run.
 std::string run_key(const TrainingConfig& config, const fs::path& out, bool remember) {
-  nlohmann::json settings = config.as_written;
-  for (const char* key : {"checkpoint_every", "log_every", "feed_ahead", "divergence_factor", "stages"}) {
-    settings.erase(key);
-  }
-  for (const char* key : {"device", "compute_threads"}) settings["network"].erase(key);
   manifests::DigestCache digests(out / "digests.txt");
   nlohmann::json assets = nlohmann::json::array();
   const TrainingNetworkConfig& network = config.network;
   for (const fs::path& path : {network.initial, network.encoders, network.smal_asset, network.priors}) {
     assets.push_back(path.empty() ? std::string() : digests.digest(path));
   }
-  nlohmann::json phases = nlohmann::json::array();
+  nlohmann::json shards = nlohmann::json::object();  // by pool
   for (const PhaseConfig& phase : config.phases) {
-    nlohmann::json pools = nlohmann::json::array();
     for (const PoolConfig& pool : phase.pools) {
-      nlohmann::json shards = nlohmann::json::array();
-      for (const fs::path& file : feed::ShardPool(pool.name, pool.shards).files())
-        shards.push_back(digests.digest(file));
-      pools.push_back({pool.name, shards, pool.weight});
+      if (shards.contains(pool.name)) continue;
+      nlohmann::json& list = shards[pool.name] = nlohmann::json::array();
+      for (const fs::path& file : feed::ShardPool(pool.name, paths(pool)).files()) {
+        list.push_back(digests.digest(file));
+      }
     }
-    phases.push_back({phase.name, to_string(phase.objective), phase.steps, phase.ief_iterations,
-                      phase.adversarial, phase.learning_rate, phase.warm_up_steps, to_string(phase.decay),
-                      pools});
   }
   if (remember) digests.save();
-  return manifests::sha256(nlohmann::json{settings, assets, phases}.dump());
+  return manifests::sha256(nlohmann::json{settings::deciding_values(config), assets, shards}.dump());
 }
 
 model::TrainerOptions trainer_options(const TrainingConfig& config, const PhaseConfig& phase) {
@@ -224,7 +228,7 @@ feed::Feed open_feed(const TrainingConfig& config, const PhaseConfig& phase, int
   std::vector<feed::ShardPool> pools;
   std::vector<double> weights;
   for (const PoolConfig& pool : phase.pools) {
-    pools.emplace_back(pool.name, pool.shards);
+    pools.emplace_back(pool.name, paths(pool));
     weights.push_back(pool.weight);
   }
   feed::FeedOptions options = config.feed;

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <string>
 
-#include "pipeline/training/training_config.h"
+#include "pipeline/training/settings/training_config.h"
 
 namespace q3d::pipeline::training {
 
@@ -40,6 +40,6 @@ struct TrainingSummary {
 // another configuration's run or the ranks do not fit each other, Interrupted on Ctrl-C after saving the
 // state, and std::runtime_error naming the batch's sample ids when loss or gradient are not finite or the
 // loss diverges, or when another rank is gone; the newest state then stays as it is.
-TrainingSummary train(const TrainingConfig& config, const TrainingOptions& options);
+TrainingSummary train(const settings::TrainingConfig& config, const TrainingOptions& options);
 
 }  // namespace q3d::pipeline::training

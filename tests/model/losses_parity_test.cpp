@@ -59,9 +59,9 @@ nlohmann::json meta_of(const std::string& name) {
   return nlohmann::json::parse(stream).at("meta");
 }
 
-LossWeights weights_of(const nlohmann::json& meta) {
+settings::LossWeights weights_of(const nlohmann::json& meta) {
   const nlohmann::json& official = meta.at("loss_weights");
-  LossWeights weights;
+  settings::LossWeights weights;
   weights.keypoints_3d = official.at("KEYPOINTS_3D");
   weights.keypoints_2d = official.at("KEYPOINTS_2D");
   weights.aux_keypoints_2d = official.at("INTERMEDIATE_KP2D");
@@ -105,15 +105,17 @@ class LossesParity : public ::testing::TestWithParam<std::string> {
   }
 
   LossTerms terms(const Targets& targets) const {
-    return loss_terms(predict(prima_), targets, priors_, LossVariant::official);
+    return loss_terms(predict(prima_), targets, priors_, settings::LossVariant::official);
   }
 
-  torch::Tensor loss(const Prima& prima, LossVariant variant = LossVariant::official) const {
+  torch::Tensor loss(const Prima& prima,
+                     settings::LossVariant variant = settings::LossVariant::official) const {
     return total_loss(loss_terms(predict(prima), targets_, priors_, variant), weights_of(meta_));
   }
 
   // Of the loss, by the parameters' names.
-  TensorMap gradients(const Prima& prima, LossVariant variant = LossVariant::official) const {
+  TensorMap gradients(const Prima& prima,
+                      settings::LossVariant variant = settings::LossVariant::official) const {
     prima.net().train();
     const std::vector<ParameterGroup> groups = parameter_groups(prima.net());
     loss(prima, variant).backward();
@@ -199,7 +201,7 @@ TEST_P(Float32LossesParity, EachTerm) {
 // On rotations the two ways to an axis and an angle agree, and so do their gradients; float64 leaves nothing
 // but the division by the sine of the angle between them.
 TEST_P(LossesParity, SoundVariantHasTheSameGradients) {
-  const TensorMap sound = gradients(prima_, LossVariant::sound);
+  const TensorMap sound = gradients(prima_, settings::LossVariant::sound);
   for (const auto& [name, official] :
        gradients(testing::parity_prima(GetParam(), config_, torch::kFloat64))) {
     const double scale = official.abs().max().item<double>();

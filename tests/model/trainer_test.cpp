@@ -101,7 +101,8 @@ TEST_F(TrainerTest, LearnsABatchByHeart) {
 
 // A head that predicts no change leaves every joint unrotated, where the official gradient is NaN.
 TEST_F(TrainerTest, UnrotatedJointsHaveAFiniteGradient) {
-  for (const LossVariant variant : {LossVariant::sound, LossVariant::official}) {
+  for (const settings::LossVariant variant :
+       {settings::LossVariant::sound, settings::LossVariant::official}) {
     TrainerOptions options = quick();
     options.variant = variant;
     Trainer learner = trainer(options);
@@ -113,7 +114,7 @@ TEST_F(TrainerTest, UnrotatedJointsHaveAFiniteGradient) {
     }
     const StepReport report = learner.step(seeded_batch(body_, 2));
     EXPECT_TRUE(std::isfinite(report.loss));
-    EXPECT_EQ(report.applied, variant == LossVariant::sound);
+    EXPECT_EQ(report.applied, variant == settings::LossVariant::sound);
   }
 }
 

@@ -132,7 +132,8 @@ smal::tensors::NamedTensors exact_steps(const RankPlace& place, const Collective
     const DecoderOutput decoded = net.decoder().refine(net.decoder().remember(features.image_tokens), betas,
                                                        net.decoder().own_parameters());
     const Prediction prediction = assemble(net, prima.body(), decoded, betas, /*with_vertices=*/false);
-    const LossTerms terms = loss_terms(prediction, batch.targets, priors, LossVariant::sound, ranks);
+    const LossTerms terms =
+        loss_terms(prediction, batch.targets, priors, settings::LossVariant::sound, ranks);
     backward->run(total_loss(terms, {}));
     if (step == 0) append_gradients(out, net);
     optimiser.step(kRate);

@@ -83,14 +83,20 @@ TEST(Settings, OnlyWhatDecidesAStageIsInItsKey) {
 
 TEST(SettingsPage, TheTablesOfDocsConfigAreTheSettings) {
   const std::string page = manifests::read_file(testing::source_dir() / "docs/config.md");
-  EXPECT_EQ(with_settings_tables(page), page)
+  EXPECT_EQ(with_settings_tables(page, build_settings_tables()), page)
       << "run: build/quadruped3d config tables docs/config.md --write";
 }
 
+TEST(SettingsPage, KnowsWhoseTablesAPageHas) {
+  EXPECT_TRUE(has_settings_table("text\n<!-- settings: tta -->\n", build_settings_tables()));
+  EXPECT_FALSE(has_settings_table("<!-- settings: phases -->\n", build_settings_tables()));
+}
+
 TEST(SettingsPage, RefusesAPageThatLacksATable) {
-  EXPECT_THROW(with_settings_tables("no table"), std::runtime_error);
-  EXPECT_THROW(with_settings_tables("<!-- settings: nothing -->\n<!-- end of settings -->\n"),
-               std::runtime_error);
+  EXPECT_THROW(with_settings_tables("no table", build_settings_tables()), std::runtime_error);
+  EXPECT_THROW(
+      with_settings_tables("<!-- settings: nothing -->\n<!-- end of settings -->\n", build_settings_tables()),
+      std::runtime_error);
 }
 
 TEST(ConfigSchema, HasEveryKeyWithItsRange) {

@@ -18,6 +18,10 @@
 namespace q3d::pipeline::training {
 namespace {
 
+using settings::Decay;
+using settings::Objective;
+using settings::PoolConfig;
+using settings::TrainingConfig;
 using ::testing::HasSubstr;
 
 class TrainingRun : public ::testing::Test {
@@ -37,15 +41,14 @@ class TrainingRun : public ::testing::Test {
     config_.network.priors = testing::parity_dir() / "weights_A.safetensors";
     config_.network.device = "cpu";
     config_.network.compute_threads = 1;
-    const PoolConfig first{"first", {path("first.h5")}, 1.0};
-    const PoolConfig second{"second", {path("second.h5")}, 0.15};
-    config_.phases = {{"warm-up", Objective::prima, {first}, 3, 2, true, 1e-3, 1, Decay::linear},
-                      {"joint", Objective::prima, {first, second}, 3, 1, false, 1e-3, 0, Decay::linear}};
+    const PoolConfig first{"first", {path("first.h5").string()}, 1.0};
+    const PoolConfig second{"second", {path("second.h5").string()}, 0.15};
+    config_.phases = {{"warm-up", Objective::prima, {}, {first}, 3, 2, true, 1e-3, 1, Decay::linear},
+                      {"joint", Objective::prima, {}, {first, second}, 3, 1, false, 1e-3, 0, Decay::linear}};
     config_.feed.batch = 2;
     config_.seed = 17;
     config_.checkpoint_every = 2;
     config_.log_every = 1;
-    config_.as_written = {{"network", nlohmann::json::object()}, {"seed", 17}};
   }
 
   std::filesystem::path path(const std::string& name) const { return scratch_.path() / name; }
@@ -77,8 +80,8 @@ TEST_F(TrainingRun, StoppedAnywhereItEndsWithTheSameWeights) {
 }
 
 TEST_F(TrainingRun, EncodersAreTrainedAloneAndResume) {
-  const PoolConfig first{"first", {path("first.h5")}, 1.0};
-  config_.phases = {{"encoders", Objective::encoders, {first}, 4, 1, false, 1e-3, 1, Decay::linear}};
+  const PoolConfig first{"first", {path("first.h5").string()}, 1.0};
+  config_.phases = {{"encoders", Objective::encoders, {}, {first}, 4, 1, false, 1e-3, 1, Decay::linear}};
   const TrainingSummary straight = run("straight");
   run("stopped", 1);
   EXPECT_EQ(manifests::read_file(straight.model), manifests::read_file(run("stopped").model));
@@ -95,7 +98,8 @@ TEST_F(TrainingRun, OneSpeciesCannotBeTold) {
   testing::write_sample_shard(path("single.h5"), "single", 1, 1);
   config_.phases = {{"encoders",
                      Objective::encoders,
-                     {{"single", {path("single.h5")}, 1.0}},
+                     {},
+                     {{"single", {path("single.h5").string()}, 1.0}},
                      4,
                      1,
                      false,
@@ -187,7 +191,7 @@ TEST_F(TrainingRun, ALossThatIsNotFiniteNamesTheSamples) {
   manifests::ShardHeader header;
   header.image_encoding = manifests::ImageEncoding::png;
   manifests::write_shard(path("poison.h5"), header, {bad});
-  config_.phases[0].pools.push_back({"poison", {path("poison.h5")}, 1000.0});
+  config_.phases[0].pools.push_back({"poison", {path("poison.h5").string()}, 1000.0});
   try {
     run("out");
     FAIL();

@@ -1,8 +1,12 @@
-// How the losses are weighed, and which form of them is used. Free of LibTorch, for whoever reads
-// configurations.
+// How the losses are weighed, and which form of them is used.
 #pragma once
 
-namespace q3d::model {
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace q3d::model::settings {
 
 // The official configuration.
 struct LossWeights {
@@ -22,6 +26,10 @@ struct LossWeights {
 // `official` repeats the released code to the bit of its gradients, which are NaN where a predicted joint is
 // not rotated at all, and lets samples without truth pose as real animals for the discriminator. `sound` has
 // neither.
-enum class LossVariant { sound, official };
+enum class LossVariant : std::uint8_t { sound, official };
 
-}  // namespace q3d::model
+std::string_view to_string(LossVariant variant);
+std::vector<std::string> loss_variant_names();                // in the order of the enumerators
+LossVariant loss_variant_from_string(std::string_view name);  // throws std::invalid_argument
+
+}  // namespace q3d::model::settings

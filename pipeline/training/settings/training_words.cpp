@@ -1,10 +1,10 @@
-#include "pipeline/training/training_words.h"
+#include "pipeline/training/settings/training_words.h"
 
 #include <array>
 
 #include "manifests/enum_names.h"
 
-namespace q3d::pipeline::training {
+namespace q3d::pipeline::training::settings {
 namespace {
 
 constexpr std::array<std::string_view, 3> kPrecisionNames{"auto", "float32", "bfloat16"};
@@ -69,4 +69,4 @@ std::span<const std::string_view> model_dtype_names() {
   return kModelDtypeNames;
 }
 
-}  // namespace q3d::pipeline::training
+}  // namespace q3d::pipeline::training::settings

@@ -9,11 +9,11 @@
 #include <string>
 #include <vector>
 
-#include "model/loss_weights.h"
+#include "model/settings/loss_weights.h"
 #include "pipeline/feed/feed.h"
-#include "pipeline/training/training_words.h"
+#include "pipeline/training/settings/training_words.h"
 
-namespace q3d::pipeline::training {
+namespace q3d::pipeline::training::settings {
 
 struct TrainingNetworkConfig {
   std::filesystem::path initial;   // checkpoint that training starts from
@@ -28,20 +28,21 @@ struct TrainingNetworkConfig {
 
 struct PoolConfig {
   std::string name;
-  std::vector<std::filesystem::path> shards;  // files and folders
-  double weight = 1.0;                        // of each sample
+  std::vector<std::string> shards;  // paths of files and folders
+  double weight = 1.0;              // of each sample
 };
 
 // A stretch of training with its own pools, rounds, optimiser and learning rate.
 struct PhaseConfig {
   std::string name;
   Objective objective = Objective::prima;
-  std::vector<PoolConfig> pools;
-  std::int64_t steps = 0;
+  std::vector<std::string> pool_names;
+  std::vector<PoolConfig> pools;  // those of pool_names
+  int steps = 0;
   int ief_iterations = 1;
   bool adversarial = false;
   double learning_rate = 3.75e-6;
-  std::int64_t warm_up_steps = 0;
+  int warm_up_steps = 0;
   Decay decay = Decay::linear;
 };
 
@@ -50,17 +51,16 @@ struct TrainingConfig {
   std::vector<PhaseConfig> phases;  // of the chosen stage
   feed::FeedOptions feed;
   int feed_ahead = 2;  // batches prepared in the background
-  model::LossWeights loss_weights;
-  model::LossVariant loss_variant = model::LossVariant::sound;
+  model::settings::LossWeights loss_weights;
+  model::settings::LossVariant loss_variant = model::settings::LossVariant::sound;
   double backbone_rate = 0.1;  // of the learning rate, in phases with the objective "prima"
   double weight_decay = 1e-4;
   double largest_gradient_norm = 0.0;  // 0 = no clipping
   double divergence_factor = 20.0;     // a loss above this times its running mean stops the run
   ModelDtype model_dtype = ModelDtype::float32;
   std::uint64_t seed = 0;
-  std::int64_t checkpoint_every = 500;  // steps
-  std::int64_t log_every = 10;          // steps
-  nlohmann::json as_written;            // the merged JSON, paths as the user wrote them
+  int checkpoint_every = 500;  // steps
+  int log_every = 10;          // steps
 };
 
 // Reads the files in order; a later file's keys replace an earlier one's. Relative paths are relative to the
@@ -73,4 +73,9 @@ TrainingConfig load_training_config(const std::vector<std::filesystem::path>& fi
 TrainingConfig parse_training_config(const nlohmann::json& json, const std::string& where,
                                      const std::string& stage);
 
-}  // namespace q3d::pipeline::training
+// The effective values that decide the trained weights, as one JSON document: defaults are filled in, so that
+// a default which changes in a later version does not go unnoticed. Paths are left out, since the digests of
+// their files decide; so are keys that only steer the run (device, threads, how often it saves and logs).
+nlohmann::json deciding_values(const TrainingConfig& config);
+
+}  // namespace q3d::pipeline::training::settings

@@ -5,7 +5,7 @@
 #include <span>
 #include <string_view>
 
-namespace q3d::pipeline::training {
+namespace q3d::pipeline::training::settings {
 
 // The names are listed in the order of the enumerators. Every *_from_string throws std::invalid_argument on
 // an unknown name.
@@ -34,4 +34,4 @@ std::string_view to_string(ModelDtype dtype);
 ModelDtype model_dtype_from_string(std::string_view name);
 std::span<const std::string_view> model_dtype_names();
 
-}  // namespace q3d::pipeline::training
+}  // namespace q3d::pipeline::training::settings
