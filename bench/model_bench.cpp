@@ -20,6 +20,8 @@
 namespace q3d::model {
 namespace {
 
+using filters::adaptation::Schedule;
+
 constexpr int kAdaptIterations = 10;
 
 struct Setting {
@@ -75,9 +77,9 @@ void adapt_instances(benchmark::State& state, const Setting& setting) {
   const ImageFeatures features = prima.encode(prima.normalise(crops(batch)));
   const torch::Tensor keypoints =
       torch::cat({torch::rand({batch, 26, 2}) - 0.5, torch::ones({batch, 26, 1})}, 2);
-  TtaSchedule schedule;
+  Schedule schedule;
   schedule.iterations = kAdaptIterations;
-  const std::vector<TtaSchedule> schedules(static_cast<std::size_t>(batch), schedule);
+  const std::vector<Schedule> schedules(static_cast<std::size_t>(batch), schedule);
   for (auto _ : state) {
     benchmark::DoNotOptimize(adapt(prima, features, keypoints, schedules, {}).best_iteration.data());
   }

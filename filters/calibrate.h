@@ -15,7 +15,7 @@ struct TargetShares {  // shares of all judged candidates; the paper: 5 of 14, 4
 // One judged candidate of the pool.
 struct CalibrationSample {
   double initial_error = 0.0;
-  bool passes_adaptation = true;  // it reaches delta (or tau_low) when it is adapted
+  bool passes_adaptation = true;  // the fidelity rule keeps it when it is adapted
 };
 
 struct Calibration {

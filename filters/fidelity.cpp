@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <optional>
 #include <stdexcept>
 
@@ -36,32 +35,43 @@ std::size_t best_iterate(std::span<const double> curve) {
   return best;
 }
 
-// Returns the relative gain within the window; NaN if none of its iterates was measured.
-double gain_within(std::span<const double> curve, int window) {
-  double least = std::numeric_limits<double>::infinity();
-  const std::size_t end = std::min(curve.size(), static_cast<std::size_t>(window) + 1);
-  for (std::size_t i = 1; i < end; ++i) {
-    if (std::isfinite(curve[i])) least = std::min(least, curve[i]);
-  }
-  if (std::isinf(least)) return std::numeric_limits<double>::quiet_NaN();
-  return curve[0] > 0 ? (curve[0] - least) / curve[0] : 0.0;
-}
-
 std::optional<Judgement> find_failure(std::span<const double> curve) {
   if (curve.empty()) return not_finite("no iterate was measured");
   if (!std::isfinite(curve[0])) return not_finite("L_proj of the prediction is not finite");
   return std::nullopt;
 }
 
-// Judges a sample whose label would be the iterate `kept`.
-Judgement judge_iterate(std::span<const double> curve, std::size_t kept, const Thresholds& thresholds) {
+std::optional<Judgement> find_failure(const char* function, std::span<const double> curve,
+                                      std::span<const double> chosen_by) {
+  if (chosen_by.size() != curve.size()) {
+    throw std::invalid_argument(
+        fmt::format("{}: got {} held-out errors of {} iterates", function, chosen_by.size(), curve.size()));
+  }
+  const auto failure = find_failure(curve);
+  return failure ? failure : find_failure(chosen_by);
+}
+
+// The numbers of a sample whose label would be the iterate `kept`, without a verdict.
+Judgement describe(std::span<const double> curve, std::size_t kept, const Thresholds& thresholds) {
   Judgement judgement;
   judgement.initial_error = curve[0];
   judgement.final_error = curve[kept];
-  judgement.gain = gain_within(curve, thresholds.gain_window);
+  judgement.gain = adaptation::relative_gain(curve, thresholds.gain_window);
   judgement.iterations = static_cast<int>(curve.size()) - 1;
   judgement.best_iteration = static_cast<int>(kept);
-  if (curve[kept] < thresholds.tau_low || judgement.gain >= thresholds.delta) {
+  return judgement;
+}
+
+// Whether adaptation ended below stop_below before the gain could be asked for.
+bool ended_early(std::span<const double> curve, const Thresholds& thresholds) {
+  return curve.size() <= static_cast<std::size_t>(thresholds.gain_window) + 1 &&
+         curve.back() < thresholds.stop_below;
+}
+
+// Judges a sample of the middle band whose label would be the iterate `kept`.
+Judgement judge_iterate(std::span<const double> curve, std::size_t kept, const Thresholds& thresholds) {
+  Judgement judgement = describe(curve, kept, thresholds);
+  if (judgement.gain >= thresholds.delta || ended_early(curve, thresholds)) {
     judgement.verdict = Verdict::refined;
     return judgement;
   }
@@ -81,6 +91,8 @@ void check(const Thresholds& t) {
   require(t.gain_window >= 1, "gain_window >= 1", t.gain_window);
   require(t.iterations_min >= 1, "iterations_min >= 1", t.iterations_min);
   require(t.iterations_min <= t.iterations_max, "iterations_min <= iterations_max", t.iterations_max);
+  require(t.stop_below >= 0, "0 <= stop_below", t.stop_below);
+  require(t.stop_below <= t.tau_low, "stop_below <= tau_low", t.stop_below);
 }
 
 Band band(double initial_error, const Thresholds& thresholds) {
@@ -89,14 +101,27 @@ Band band(double initial_error, const Thresholds& thresholds) {
   return Band::discard;
 }
 
-int adaptation_iterations(double initial_error, const Thresholds& thresholds) {
-  if (band(initial_error, thresholds) != Band::refine) {
-    throw std::invalid_argument(fmt::format("L_proj {} lies outside the middle band [{}, {})", initial_error,
-                                            thresholds.tau_low, thresholds.tau_high));
+bool is_adapted(double initial_error, const Thresholds& thresholds) {
+  const Band own = band(initial_error, thresholds);
+  return own == Band::refine || (own == Band::retain && thresholds.refine_retained);
+}
+
+adaptation::Schedule adaptation_schedule(double initial_error, const Thresholds& thresholds) {
+  if (!is_adapted(initial_error, thresholds)) {
+    throw std::invalid_argument(fmt::format("L_proj {} lies outside the middle band [{}, {}){}",
+                                            initial_error, thresholds.tau_low, thresholds.tau_high,
+                                            thresholds.refine_retained ? " and not below it" : ""));
   }
+  adaptation::Schedule schedule;
+  schedule.iterations = thresholds.iterations_min;
+  schedule.stop_below = thresholds.stop_below;
+  schedule.gain_window = thresholds.gain_window;
+  if (band(initial_error, thresholds) == Band::retain) return schedule;
   const double position = (initial_error - thresholds.tau_low) / (thresholds.tau_high - thresholds.tau_low);
   const int range = thresholds.iterations_max - thresholds.iterations_min;
-  return static_cast<int>(std::lround(thresholds.iterations_min + range * position));
+  schedule.iterations = static_cast<int>(std::lround(thresholds.iterations_min + range * position));
+  schedule.min_gain = thresholds.delta;
+  return schedule;
 }
 
 Judgement judge_initial(double initial_error, const Thresholds& thresholds) {
@@ -130,12 +155,7 @@ Judgement judge_adapted(std::span<const double> curve, const Thresholds& thresho
 
 Judgement judge_held_out(std::span<const double> curve, std::span<const double> held_out,
                          const Thresholds& thresholds) {
-  if (held_out.size() != curve.size()) {
-    throw std::invalid_argument(
-        fmt::format("judge_held_out: got {} held-out errors of {} iterates", held_out.size(), curve.size()));
-  }
-  if (const auto failure = find_failure(curve)) return *failure;
-  if (const auto failure = find_failure(held_out)) return *failure;
+  if (const auto failure = find_failure("judge_held_out", curve, held_out)) return *failure;
   const std::size_t best = best_iterate(held_out);
   Judgement judgement = judge_iterate(curve, best, thresholds);
   if (judgement.verdict == Verdict::refined && best == 0) {
@@ -143,6 +163,15 @@ Judgement judge_held_out(std::span<const double> curve, std::span<const double> 
     judgement.reason = Reason::held_out_not_better;
     judgement.detail = fmt::format("no iterate brings the held-out keypoints below {:.4g}", held_out[0]);
   }
+  return judgement;
+}
+
+Judgement judge_retained(std::span<const double> curve, std::span<const double> chosen_by,
+                         const Thresholds& thresholds) {
+  if (const auto failure = find_failure("judge_retained", curve, chosen_by)) return *failure;
+  const std::size_t best = best_iterate(chosen_by);
+  Judgement judgement = describe(curve, best, thresholds);
+  judgement.verdict = best == 0 ? Verdict::retained : Verdict::refined;
   return judgement;
 }
 

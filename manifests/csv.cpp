@@ -80,8 +80,14 @@ CsvTableReader::CsvTableReader(std::string_view text, std::string where) : lines
 }
 
 std::size_t CsvTableReader::column(const std::string& name) const {
+  const std::optional<std::size_t> found = find_column(name);
+  if (!found) lines_.fail("no column \"" + name + "\"", "one");
+  return *found;
+}
+
+std::optional<std::size_t> CsvTableReader::find_column(const std::string& name) const {
   const auto found = std::find(header_.begin(), header_.end(), name);
-  if (found == header_.end()) lines_.fail("no column \"" + name + "\"", "one");
+  if (found == header_.end()) return std::nullopt;
   return static_cast<std::size_t>(found - header_.begin());
 }
 

@@ -54,6 +54,8 @@ class CsvTableReader {
 
   // Returns the position of a column. Throws like fail() if the table has no such column.
   std::size_t column(const std::string& name) const;
+  // The same for a column that not every version of the file has.
+  std::optional<std::size_t> find_column(const std::string& name) const;
   // Reads the next row. Returns false at the end of the text. Throws like CsvReader::next, and if the row has
   // another number of cells than the first line.
   bool next();

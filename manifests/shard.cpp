@@ -6,8 +6,10 @@
 #include <array>
 #include <charconv>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <stdexcept>
 
+#include "manifests/keypoint_names.h"
 #include "manifests/shard_columns.h"
 
 namespace q3d::manifests {
@@ -25,6 +27,29 @@ std::string describe_columns() {
                             {"meaning", column.meaning}};
   }
   return columns.dump();
+}
+
+std::string describe_datasets(const std::map<std::string, DatasetTerms>& datasets) {
+  nlohmann::json object = nlohmann::json::object();
+  for (const auto& [name, terms] : datasets) {
+    object[name] = {
+        {"licence", terms.licence}, {"source_url", terms.source_url}, {"citation", terms.citation}};
+  }
+  return object.dump();
+}
+
+std::map<std::string, DatasetTerms> datasets_from(const std::string& text) {
+  std::map<std::string, DatasetTerms> datasets;
+  const nlohmann::json object = nlohmann::json::parse(text);
+  for (const auto& [name, terms] : object.items()) {
+    datasets[name] = {terms.at("licence").get<std::string>(), terms.at("source_url").get<std::string>(),
+                      terms.at("citation").get<std::string>()};
+  }
+  return datasets;
+}
+
+std::string keypoint_names_text() {
+  return nlohmann::json(kKeypointNames).dump();
 }
 
 void check_sample(const ShardHeader& header, const ShardSample& sample) {
@@ -60,6 +85,14 @@ void add_column(Table& table, const ShardColumn& column, const std::vector<Shard
   }
 }
 
+// The schema that the text states, if this program reads it.
+std::optional<int> known_schema(const std::string& text) {
+  for (int schema = 1; schema <= kShardSchema; ++schema) {
+    if (text == std::to_string(schema)) return schema;
+  }
+  return std::nullopt;
+}
+
 // Checks magic and schema, in that order, before anything else of the file is read.
 std::filesystem::path check_identity(const std::filesystem::path& path) {
   const auto attributes = read_table_attributes(path);
@@ -70,11 +103,10 @@ std::filesystem::path check_identity(const std::filesystem::path& path) {
                     format == attributes.end() ? "absent" : '"' + format->second + '"', kFormat));
   }
   const auto schema = attributes.find("schema");
-  if (schema == attributes.end() || schema->second != std::to_string(kShardSchema)) {
+  if (schema == attributes.end() || !known_schema(schema->second)) {
     throw std::runtime_error(
-        fmt::format("{}: shard schema {}, but this program reads schema {}. Use the version of the program "
-                    "that wrote it, or "
-                    "build the dataset again.",
+        fmt::format("{}: shard schema {}, but this program reads schemas 1 to {}. Use the version of the "
+                    "program that wrote it, or build the dataset again.",
                     path.string(), schema == attributes.end() ? "absent" : schema->second, kShardSchema));
   }
   return path;
@@ -88,7 +120,8 @@ ShardHeader read_header(const TableReader& table) {
     }
     return found->second;
   };
-  ShardHeader header{.dataset = text("dataset"), .version = text("version")};
+  ShardHeader header{
+      .schema = known_schema(text("schema")).value(), .dataset = text("dataset"), .version = text("version")};
   const std::string& unit = text("unit");
   const auto [end, error] = std::from_chars(unit.data(), unit.data() + unit.size(), header.unit);
   if (error != std::errc() || end != unit.data() + unit.size()) {
@@ -103,6 +136,20 @@ ShardHeader read_header(const TableReader& table) {
         fmt::format("{}: attribute image_encoding is \"{}\", expected jpeg, png or reference",
                     table.path().string(), encoding));
   }
+  if (header.schema < 2) return header;
+  if (text("keypoint_names") != keypoint_names_text()) {
+    throw std::runtime_error(fmt::format("{}: attribute keypoint_names is {}, expected {}",
+                                         table.path().string(), text("keypoint_names"),
+                                         keypoint_names_text()));
+  }
+  try {
+    header.datasets = datasets_from(text("datasets"));
+  } catch (const nlohmann::json::exception& error) {
+    throw std::runtime_error(
+        fmt::format("{}: attribute datasets: {}; expected an object of objects with "
+                    "licence, source_url and citation",
+                    table.path().string(), error.what()));
+  }
   return header;
 }
 
@@ -115,9 +162,10 @@ bool matches(const ShardColumn& expected, const TableReader::Column& got) {
   return got.kind == (is_text ? TableReader::Kind::text : TableReader::Kind::blob);
 }
 
-void check_completeness(const TableReader& table) {
+void check_completeness(const TableReader& table, int schema) {
   const auto& columns = table.columns();
   for (const ShardColumn& expected : shard_columns()) {
+    if (expected.since > schema) continue;
     const auto got = columns.find(expected.name);
     if (got == columns.end() || !matches(expected, got->second)) {
       throw std::runtime_error(fmt::format("{}: column {} is {}, expected {} {}", table.path().string(),
@@ -127,10 +175,12 @@ void check_completeness(const TableReader& table) {
     }
   }
   for (const auto& [name, column] : columns) {
-    const auto known = [&name = name](const ShardColumn& expected) { return expected.name == name; };
+    const auto known = [&name = name, schema](const ShardColumn& expected) {
+      return expected.name == name && expected.since <= schema;
+    };
     if (std::none_of(shard_columns().begin(), shard_columns().end(), known)) {
       throw std::runtime_error(
-          fmt::format("{}: column {} is not in schema {}", table.path().string(), name, kShardSchema));
+          fmt::format("{}: column {} is not in schema {}", table.path().string(), name, schema));
     }
   }
 }
@@ -174,6 +224,8 @@ std::string write_shard(const std::filesystem::path& path, const ShardHeader& he
                       {"version", header.version},
                       {"unit", std::to_string(header.unit)},
                       {"image_encoding", std::string(to_string(header.image_encoding))},
+                      {"keypoint_names", keypoint_names_text()},
+                      {"datasets", describe_datasets(header.datasets)},
                       {"columns", describe_columns()}};
   for (const ShardSample& sample : samples) check_sample(header, sample);
   for (const ShardColumn& column : shard_columns()) add_column(table, column, samples);
@@ -182,7 +234,7 @@ std::string write_shard(const std::filesystem::path& path, const ShardHeader& he
 
 ShardReader::ShardReader(const std::filesystem::path& path) : table_(check_identity(path)) {
   header_ = read_header(table_);
-  check_completeness(table_);
+  check_completeness(table_, header_.schema);
 }
 
 std::vector<ShardSample> ShardReader::samples(std::int64_t first, std::int64_t count) const {
@@ -192,7 +244,9 @@ std::vector<ShardSample> ShardReader::samples(std::int64_t first, std::int64_t c
   }
   std::vector<ShardSample> samples(static_cast<std::size_t>(count));
   if (samples.empty()) return samples;
-  for (const ShardColumn& column : shard_columns()) load_column(table_, column, first, samples);
+  for (const ShardColumn& column : shard_columns()) {
+    if (column.since <= header_.schema) load_column(table_, column, first, samples);
+  }
   return samples;
 }
 

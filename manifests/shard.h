@@ -1,9 +1,11 @@
-// The shard: schema 1 of the published dataset, its writer and its reader. docs/shard-format.md describes it.
+// The shard of the published dataset, its writer (schema 2) and its reader (schemas 1 and 2).
+// docs/shard-format.md describes it.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -16,7 +18,7 @@
 
 namespace q3d::manifests {
 
-inline constexpr int kShardSchema = 1;
+inline constexpr int kShardSchema = 2;  // the one that is written; every earlier one is read
 
 // One labelled sample. A record that is read from a shard has no absolute paths. Pixel quantities are pixels
 // of the source image unless stated otherwise. Crop units are those of the network's crop (side 1, range
@@ -46,18 +48,28 @@ struct ShardSample {
   smal::CropPoints projected_2d{};  // keypoints of the body
 };
 
+// Under which terms the pictures and annotations of a source dataset came, in the words of the build's
+// config; empty where it says nothing.
+struct DatasetTerms {
+  std::string licence{};
+  std::string source_url{};
+  std::string citation{};
+  bool operator==(const DatasetTerms&) const = default;
+};
+
 struct ShardHeader {
   int schema = kShardSchema;
   std::string dataset;  // name of the build
   std::string version;  // config key of the build
   std::int64_t unit = 0;
   ImageEncoding image_encoding = ImageEncoding::jpeg;
+  std::map<std::string, DatasetTerms> datasets{};  // by "dataset/split"; empty in schema 1
 };
 
 // Writes one shard atomically and returns its SHA-256. Equal input gives equal bytes. Absolute paths are not
-// written. Throws std::runtime_error that names the path (disk full, ...). Throws std::invalid_argument that
-// names a sample which cannot be in a shard: a failed record, a crop in a shard of references, or no crop in
-// another one.
+// written. The attribute keypoint_names is kKeypointNames. Throws std::runtime_error that names the path
+// (disk full, ...). Throws std::invalid_argument that names a sample which cannot be in a shard: a failed
+// record, a crop in a shard of references, or no crop in another one.
 std::string write_shard(const std::filesystem::path& path, const ShardHeader& header,
                         const std::vector<ShardSample>& samples);
 
@@ -73,8 +85,8 @@ class ShardReader {
   // Gives access to single columns of some rows.
   const TableReader& table() const { return table_; }
   // Returns the rows [first, first + count) with all columns. Throws std::out_of_range for rows that the
-  // shard lacks, and std::runtime_error that names path, column and row for a value that schema 1 does not
-  // know.
+  // shard lacks, and std::runtime_error that names path, column and row for a value that the schema does not
+  // know. What schema 1 does not have is as it is by default: trust scores are NaN.
   std::vector<ShardSample> samples(std::int64_t first, std::int64_t count) const;
 
  private:

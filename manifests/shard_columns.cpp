@@ -9,6 +9,8 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "manifests/trust.h"
+
 namespace q3d::manifests {
 namespace {
 
@@ -249,6 +251,17 @@ Columns verdict_columns() {
   };
 }
 
+Columns trust_columns() {
+  Columns columns;
+  for (const TrustColumn& each : kTrustColumns) {
+    columns.push_back(numbers<double>(
+        each.name, {}, each.units,
+        each.meaning, [score = each.score](auto& s) -> auto& { return s.judgement.trust.*score; }));
+    columns.back().since = 2;
+  }
+  return columns;
+}
+
 Columns label_columns() {
   return {
       flag("has_pose", "1 when pose is a label", &ShardSample::has_pose),
@@ -303,7 +316,7 @@ const std::vector<ShardColumn>& shard_columns() {
   static const Columns columns = [] {
     Columns all;
     for (Columns& group : std::array{identity_columns(), picture_columns(), keypoint_columns(),
-                                     verdict_columns(), label_columns(), truth_columns()}) {
+                                     verdict_columns(), trust_columns(), label_columns(), truth_columns()}) {
       std::move(group.begin(), group.end(), std::back_inserter(all));
     }
     return all;

@@ -1,4 +1,4 @@
-// Schema 1, column by column. The shard's writer, its reader, its self-description and the document all
+// The columns of the schemas. The shard's writer, its reader, its self-description and the document all
 // follow this list.
 #pragma once
 
@@ -34,10 +34,11 @@ struct ShardColumn {
   std::string units;  // empty if the column has none
   std::string meaning;
   std::variant<NumberColumn, TextColumn, BytesColumn> content;
+  int since = 1;  // the first schema that has the column
 };
 
-// The columns in the order of the document. Loading uses the same order, so truth_present comes before the
-// columns that depend on it.
+// The columns of the newest schema in the order of the document; an older schema has those that are not
+// newer. Loading uses the same order, so truth_present comes before the columns that depend on it.
 const std::vector<ShardColumn>& shard_columns();
 
 std::string dtype_of(const ShardColumn& column);  // "float32", ..., "text", "bytes"

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "manifests/sample.h"
+#include "manifests/trust.h"
 
 namespace q3d::manifests {
 
@@ -30,6 +31,7 @@ struct Judgement {
   double gain = std::numeric_limits<double>::quiet_NaN();  // relative gain within the first ten iterations
   int iterations = 0;                                      // adaptation steps taken
   int best_iteration = 0;  // number of the kept iterate; 0 is the prediction itself
+  TrustScores trust;       // of the label
 };
 
 }  // namespace q3d::manifests

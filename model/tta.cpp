@@ -14,6 +14,8 @@
 namespace q3d::model {
 namespace {
 
+using filters::adaptation::Schedule;
+
 // A batch of decoder outputs as rows, so that picking iterates is one copy.
 torch::Tensor pack(const DecoderOutput& output) {
   return torch::cat({output.pose_6d, output.betas, output.camera, output.aux_keypoints_2d.flatten(1),
@@ -44,7 +46,7 @@ torch::Tensor objective(const TtaOptions& options, const torch::Tensor& projecte
          options.reproj_weight * mean_absolute_error(projected, targets, targets.fitted);
 }
 
-KeypointTargets make_targets(const torch::Tensor& keypoints, const std::vector<TtaSchedule>& schedules,
+KeypointTargets make_targets(const torch::Tensor& keypoints, const std::vector<Schedule>& schedules,
                              torch::TensorOptions options) {
   torch::Tensor held_out = torch::zeros({keypoints.size(0), kKeypoints, 1}, options.device(torch::kCPU));
   for (std::size_t i = 0; i < schedules.size(); ++i) {
@@ -67,13 +69,12 @@ void require(bool holds, const std::string& message) {
   if (!holds) throw std::invalid_argument("adapt: " + message);
 }
 
-void check_held_out(const torch::Tensor& keypoints, const std::vector<TtaSchedule>& schedules) {
+void check_held_out(const torch::Tensor& keypoints, const std::vector<Schedule>& schedules) {
   const torch::Tensor weights = keypoints.select(2, 2).to(torch::kCPU, torch::kFloat64).contiguous();
   const auto weight = weights.accessor<double, 2>();
   for (std::size_t i = 0; i < schedules.size(); ++i) {
-    const TtaSchedule& schedule = schedules[i];
-    require(schedule.patience >= 0, fmt::format("a schedule with a patience of {}", schedule.patience));
-    if (schedule.held_out.none()) continue;
+    const Schedule& schedule = schedules[i];
+    if (!filters::adaptation::holds_out(schedule)) continue;
     int fitted = 0;
     for (std::size_t k = 0; k < schedule.held_out.size(); ++k) {
       const bool visible = weight[static_cast<std::int64_t>(i)][static_cast<std::int64_t>(k)] > 0.0;
@@ -86,7 +87,7 @@ void check_held_out(const torch::Tensor& keypoints, const std::vector<TtaSchedul
 }
 
 void check_arguments(const Prima& prima, const ImageFeatures& features, const torch::Tensor& keypoints,
-                     const std::vector<TtaSchedule>& schedules, const TtaOptions& options) {
+                     const std::vector<Schedule>& schedules, const TtaOptions& options) {
   require_features(prima.net(), features);
   require(!prima.net().is_training(), "the network is in training mode; call eval() first");
   const std::int64_t batch = features.bio_token.size(0);
@@ -97,33 +98,13 @@ void check_arguments(const Prima& prima, const ImageFeatures& features, const to
                       keypoints.dim(), keypoints.numel()));
   require(static_cast<std::int64_t>(schedules.size()) == batch,
           fmt::format("{} schedules for {} instances", schedules.size(), batch));
-  for (const TtaSchedule& schedule : schedules) {
-    require(schedule.iterations >= 0 && schedule.gain_window >= 1,
-            fmt::format("a schedule with {} iterations and a gain window of {}", schedule.iterations,
-                        schedule.gain_window));
-  }
+  for (const Schedule& schedule : schedules) filters::adaptation::check(schedule);
   check_held_out(keypoints, schedules);
   require(std::isfinite(options.learning_rate) && options.learning_rate >= 0.0,
           fmt::format("learning rate {}", options.learning_rate));
   require(std::is_sorted(options.snapshots.begin(), options.snapshots.end()) &&
               (options.snapshots.empty() || options.snapshots.front() >= 0),
           "snapshots must be ascending and 0 or more");
-}
-
-// (L0 - min over iterates 1..n) / L0.
-double relative_gain(const std::vector<double>& l_proj) {
-  const double least = *std::min_element(l_proj.begin() + 1, l_proj.end());
-  return l_proj.front() > 0.0 ? (l_proj.front() - least) / l_proj.front() : 0.0;
-}
-
-// `best`: the best iterate so far.
-bool wants_to_stop(const TtaSchedule& schedule, const std::vector<double>& l_proj, int best) {
-  const int taken = static_cast<int>(l_proj.size()) - 1;
-  if (taken >= schedule.iterations) return true;
-  if (schedule.held_out.any() && schedule.patience > 0 && taken - best >= schedule.patience) return true;
-  if (schedule.stop_below > 0.0 && l_proj.back() < schedule.stop_below) return true;
-  return schedule.min_gain > 0.0 && taken == schedule.gain_window &&
-         relative_gain(l_proj) < schedule.min_gain;
 }
 
 // The active instances at one iterate.
@@ -138,12 +119,11 @@ struct Iterate {
 class Adaptation {
  public:
   Adaptation(const Prima& prima, const ImageFeatures& features, const torch::Tensor& keypoints,
-             const std::vector<TtaSchedule>& schedules, const TtaOptions& options)
+             const std::vector<Schedule>& schedules, const TtaOptions& options)
       : prima_(prima),
         schedules_(schedules),
         options_(options),
-        holds_out_(std::any_of(schedules.begin(), schedules.end(),
-                               [](const TtaSchedule& schedule) { return schedule.held_out.any(); })),
+        holds_out_(std::any_of(schedules.begin(), schedules.end(), filters::adaptation::holds_out)),
         initial_betas_(decoder().initial_betas(features.bio_token)),
         slots_(decoder().own_parameters(), decoder().remember(features.image_tokens), initial_betas_.clone(),
                make_targets(keypoints, schedules, initial_betas_.options())) {
@@ -239,7 +219,7 @@ class Adaptation {
       accepted.push_back(slot);
       result_.loss[instance].push_back(rows[0][slot]);
       result_.l_proj[instance].push_back(rows[1][slot]);
-      const bool holds_out = schedules_[instance].held_out.any();
+      const bool holds_out = filters::adaptation::holds_out(schedules_[instance]);
       if (holds_out) result_.held_out[instance].push_back(rows[3][slot]);
       const std::vector<double>& judged = holds_out ? result_.held_out[instance] : result_.l_proj[instance];
       int& best = result_.best_iteration[instance];
@@ -248,7 +228,7 @@ class Adaptation {
         best = taken_;
       }
       goes_on[static_cast<std::size_t>(slot)] =
-          !wants_to_stop(schedules_[instance], result_.l_proj[instance], best);
+          !filters::adaptation::is_finished(schedules_[instance], result_.l_proj[instance], best);
     }
     if (taken_ == 0) {  // slots are still in the order of instances; unusable ones have nothing better
       best_ = iterate.rows.clone();
@@ -271,7 +251,7 @@ class Adaptation {
   }
 
   const Prima& prima_;
-  const std::vector<TtaSchedule>& schedules_;
+  const std::vector<Schedule>& schedules_;
   const TtaOptions& options_;
   bool holds_out_;               // any instance does
   torch::Tensor initial_betas_;  // (B, 41)
@@ -285,7 +265,7 @@ class Adaptation {
 }  // namespace
 
 TtaResult adapt(const Prima& prima, const ImageFeatures& features, const torch::Tensor& keypoints,
-                const std::vector<TtaSchedule>& schedules, const TtaOptions& options) {
+                const std::vector<filters::adaptation::Schedule>& schedules, const TtaOptions& options) {
   check_arguments(prima, features, keypoints, schedules, options);
   const torch::NoGradGuard no_grad;
   return Adaptation(prima, features, keypoints, schedules, options).run();

@@ -6,9 +6,9 @@
 
 #include <torch/torch.h>
 
-#include <bitset>
 #include <vector>
 
+#include "filters/adaptation/schedule.h"
 #include "model/decoder.h"
 #include "model/prima.h"
 
@@ -27,19 +27,6 @@ struct TtaOptions {
   std::vector<int> snapshots;  // iterates to keep beside the best and the last; ascending
 };
 
-// When one instance stops. All fields are per instance, so that its result does not depend on its batch mates
-// beyond rounding.
-struct TtaSchedule {
-  int iterations = 10;
-  double stop_below = 0.0;  // stop as soon as L_proj is below this (tau_low); 0 = never
-  double min_gain = 0.0;  // give up after `gain_window` iterations when the relative gain is less; 0 = never
-  int gain_window = 10;
-  // Visible keypoints that the objective does not see; the others must not all be among them. Where there are
-  // any, the best iterate is the one of least error on them.
-  std::bitset<static_cast<std::size_t>(kKeypoints)> held_out;
-  int patience = 0;  // stop after so many iterations without a new least held-out error; 0 = never
-};
-
 // L_proj: mean over visible keypoints and both coordinates of |projected - annotated|.
 struct TtaResult {
   Prediction best;  // the iterate of least L_proj, or of least held-out error; iteration 0 included
@@ -56,10 +43,11 @@ struct TtaResult {
 };
 
 // keypoints (B, 26, 3): x, y in crop units and a weight; visible iff weight > 0 (the value is not a weight
-// here). schedules: one an instance. An instance without visible keypoints is left as it is. One whose loss
-// or numbers become non-finite keeps its last finite iterate. Vertices are not computed. Throws
-// std::invalid_argument on shapes that disagree, a network in training mode, or options out of range.
+// here). schedules: one an instance; their held-out keypoints must be visible. An instance without visible
+// keypoints is left as it is. One whose loss or numbers become non-finite keeps its last finite iterate.
+// Vertices are not computed. Throws std::invalid_argument on shapes that disagree, a network in training
+// mode, or options out of range.
 TtaResult adapt(const Prima& prima, const ImageFeatures& features, const torch::Tensor& keypoints,
-                const std::vector<TtaSchedule>& schedules, const TtaOptions& options);
+                const std::vector<filters::adaptation::Schedule>& schedules, const TtaOptions& options);
 
 }  // namespace q3d::model

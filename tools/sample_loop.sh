@@ -72,7 +72,7 @@ loop() {
   local stage2=(--config configs/world_stage2.json --config "$run/stage2.json")
   [ -f "$run/thresholds.json" ] ||
     "$program" calibrate "${stage2[@]}" --out "$run/stage2" --write "$run/thresholds.json"
-  stage2+=(--config "$run/thresholds.json" --config configs/world_deep.json)
+  stage2+=(--config "$run/thresholds.json")
   "$program" build "${stage2[@]}" --out "$run/stage2"
   say "how true the pseudo labels are"
   "$program" evaluate-labels "${stage2[@]}" --out "$run/stage2" \

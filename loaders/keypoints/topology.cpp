@@ -10,6 +10,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "manifests/keypoint_names.h"
+
 namespace q3d::loaders::keypoints {
 namespace {
 
@@ -45,12 +47,10 @@ Topology make(const std::string& name, const std::string& keypoints, const Pairs
 // Names: the official code's configuration (metadata.bodyparts), except 19 and 25, whose names are swapped
 // there: its own vertex groups put 19 at the tip of the tail and 25 at its middle.
 Topology animal3d26() {
-  const char* names =
-      "left_eye right_eye chin left_front_paw right_front_paw left_back_paw right_back_paw "
-      "tail_base left_front_thigh right_front_thigh left_back_thigh right_back_thigh "
-      "left_shoulder right_shoulder left_front_knee right_front_knee left_back_knee "
-      "right_back_knee neck tail_tip left_ear right_ear left_mouth_corner right_mouth_corner "
-      "nose tail_mid";
+  std::string names;
+  for (const std::string_view name : manifests::kKeypointNames) {
+    names.append(names.empty() ? "" : " ").append(name);
+  }
   return make("animal3d26", names,
               {{0, 1}, {3, 4}, {5, 6}, {8, 9}, {10, 11}, {12, 13}, {14, 15}, {16, 17}, {20, 21}, {22, 23}},
               names);

@@ -1,6 +1,7 @@
 #include "pipeline/build/build.h"
 
 #include <chrono>
+#include <map>
 #include <memory>
 #include <optional>
 
@@ -36,6 +37,7 @@ class UnitBuilder {
         refinements_(workspace.out(), "refine", keys.refine),
         crops_(workspace.out(), "crops", keys.crops),
         shards_(workspace.out(), "shards", keys.shards, &candidates::Unit::label_digest),
+        terms_(dataset::terms_of_datasets(config)),
         judgements_(workspace.ingest().candidates.size()),
         progress_("candidates", static_cast<std::int64_t>(workspace.ingest().candidates.size()),
                   workspace.quiet()) {
@@ -126,6 +128,10 @@ class UnitBuilder {
     header.version = keys_.shards;
     header.unit = work.unit->index;
     header.image_encoding = config_.shards.images;
+    for (const candidates::Candidate& candidate : work.candidates) {
+      const std::string name = candidates::dataset_key(candidate.record);
+      header.datasets[name] = terms_.at(name);
+    }
     shards_.save(
         *work.unit, static_cast<std::int64_t>(samples.size()),
         [&](const std::filesystem::path& path) { return manifests::write_shard(path, header, samples); });
@@ -139,10 +145,11 @@ class UnitBuilder {
   stages::StageStore refinements_;
   stages::StageStore crops_;
   stages::StageStore shards_;
-  std::optional<stages::StageStore> measurements_;  // where the rules measure labels
-  std::unique_ptr<unit::LabelMeasurer> measurer_;   // made and used on the device's thread
-  std::vector<manifests::Judgement> judgements_;    // of every candidate, in ingest order
-  std::int64_t crops_encoded_ = 0;                  // in this run
+  std::optional<stages::StageStore> measurements_;        // where the rules measure labels
+  std::unique_ptr<unit::LabelMeasurer> measurer_;         // made and used on the device's thread
+  std::map<std::string, manifests::DatasetTerms> terms_;  // by candidates::dataset_key
+  std::vector<manifests::Judgement> judgements_;          // of every candidate, in ingest order
+  std::int64_t crops_encoded_ = 0;                        // in this run
   run::Progress progress_;
 };
 

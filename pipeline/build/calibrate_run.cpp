@@ -79,7 +79,8 @@ std::vector<Scored> predict_pool(const config::BuildConfig& config, Workspace& w
 }
 
 // Adapts some candidates for as long as the gain is measured and says which of them the fidelity rule would
-// keep. `limits` has no tau_high, so that all of them lie in the middle band.
+// keep: the gain within the first iterations decides. `limits` has no tau_high, so that all of them lie in
+// the middle band.
 std::vector<bool> adapt_some(const std::vector<const Scored*>& candidates, const filters::Thresholds& limits,
                              const config::BuildConfig& config, Workspace& workspace) {
   std::vector<std::vector<std::uint8_t>> patches(candidates.size());
@@ -149,6 +150,15 @@ double delta_of(const std::string& dataset, const config::FilterConfig& filter) 
   return own == filter.datasets.end() ? filter.delta : own->second.delta.value_or(filter.delta);
 }
 
+void require_stop_below(double stop_below, double tau_low) {
+  if (stop_below <= tau_low) return;
+  throw run::ConfigError(
+      fmt::format("tta.stop_below is {}, but the pool's tau_low is {:.6g}, and adaptation may not end above "
+                  "tau_low. Give "
+                  "a smaller number, or leave the key out",
+                  stop_below, tau_low));
+}
+
 filters::CalibratedPool calibrate_pool(const std::string& dataset, const std::vector<Scored>& candidates,
                                        const config::BuildConfig& config, Workspace& workspace) {
   if (candidates.empty()) {
@@ -167,8 +177,11 @@ filters::CalibratedPool calibrate_pool(const std::string& dataset, const std::ve
   base.delta = delta_of(dataset, config.filter);
   // tau_low is a quantile of the errors alone; what passes adaptation decides tau_high.
   filters::Thresholds limits = filters::calibrate(pool, config.calibrate, base).thresholds;
+  require_stop_below(config.tta.stop_below, limits.tau_low);
+  limits.stop_below = config.tta.stop_below;
   limits.tau_high = kNoLimit;
-  limits.iterations_min = limits.iterations_max = limits.gain_window;
+  // The rule asks for the gain of the first iterations only, so no more of them are needed here.
+  limits.iterations_min = limits.iterations_max = std::min(limits.gain_window, config.tta.iterations_max);
   filters::CalibratedPool result;
   result.dataset = dataset;
   result.adapted = adapt_until_enough(pool, candidates, limits, config, workspace);

@@ -4,6 +4,8 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <map>
+#include <nlohmann/json.hpp>
 #include <set>
 #include <stdexcept>
 
@@ -71,7 +73,31 @@ void digest_pictures(std::vector<Candidate>& candidates, manifests::DigestCache&
   run::throw_if_interrupted();
 }
 
-std::vector<Unit> cut_units(const std::vector<Candidate>& candidates, std::size_t unit_size) {
+// What the config says of the terms of its datasets, as text, by dataset_key; nothing where it says nothing.
+std::map<std::string, std::string> texts_of_terms(const config::BuildConfig& config) {
+  std::map<std::string, std::string> texts;
+  for (const config::DatasetConfig& dataset : config.datasets) {
+    if (dataset.licence.empty() && dataset.source_url.empty() && dataset.citation.empty()) continue;
+    const nlohmann::json parts{dataset.licence, dataset.source_url, dataset.citation};
+    texts[dataset.name + "/" + dataset.split] = parts.dump();
+  }
+  return texts;
+}
+
+std::string digest_labels(const Unit& unit, const std::vector<Candidate>& candidates,
+                          const std::map<std::string, std::string>& terms) {
+  std::map<std::string, std::string> own;
+  for (std::size_t i = unit.first; i < unit.first + unit.count; ++i) {
+    if (const auto found = terms.find(dataset_key(candidates[i].record)); found != terms.end())
+      own.insert(*found);
+  }
+  return own.empty() ? unit.input_digest
+                     : manifests::sha256(unit.input_digest + '\n' + nlohmann::json(own).dump());
+}
+
+std::vector<Unit> cut_units(const std::vector<Candidate>& candidates, const config::BuildConfig& config) {
+  const auto unit_size = static_cast<std::size_t>(config.shards.unit_size);
+  const std::map<std::string, std::string> terms = texts_of_terms(config);
   std::vector<Unit> units;
   for (std::size_t first = 0; first < candidates.size(); first += unit_size) {
     Unit unit;
@@ -86,7 +112,7 @@ std::vector<Unit> cut_units(const std::vector<Candidate>& candidates, std::size_
       if (!candidates[i].finding.empty()) text += candidates[i].finding + '\n';
     }
     unit.input_digest = manifests::sha256(text);
-    unit.label_digest = unit.input_digest;
+    unit.label_digest = digest_labels(unit, candidates, terms);
     units.push_back(std::move(unit));
   }
   return units;
@@ -104,6 +130,10 @@ std::vector<std::string> check_truth(const config::DatasetConfig& options,
 }
 
 }  // namespace
+
+std::string dataset_key(const manifests::SampleRecord& record) {
+  return record.dataset + "/" + record.split;
+}
 
 IngestedDataset read_dataset(const config::DatasetConfig& options, manifests::DigestCache& digests) {
   run::throw_if_interrupted();
@@ -133,7 +163,7 @@ Ingest ingest(const config::BuildConfig& config, manifests::DigestCache& digests
   require_unique_ids(result.candidates);
   digest_pictures(result.candidates, digests);
   digests.save();
-  result.units = cut_units(result.candidates, static_cast<std::size_t>(config.shards.unit_size));
+  result.units = cut_units(result.candidates, config);
   return result;
 }
 

@@ -37,8 +37,9 @@ struct Unit {
   std::size_t first = 0;  // into Ingest::candidates
   std::size_t count = 0;
   std::string input_digest;  // over the records, pictures, masks and roles of the unit
-  std::string
-      label_digest;  // the same, and over what is left out: predictions do not depend on it, shards do
+  // The same, and over the terms of the unit's datasets and what is left out: shards depend on these,
+  // predictions do not.
+  std::string label_digest;
 };
 
 // What came of comparing the pool with the test sets.
@@ -68,6 +69,9 @@ struct Ingest {
 // an empty one leaves their bodies unchecked, for callers that look at pictures alone.
 Ingest ingest(const config::BuildConfig& config, manifests::DigestCache& digests,
               const device::BodyMeshesLoader& load_bodies);
+
+// Returns a dataset's name and split as one word, "name/split": the key of whatever is listed by dataset.
+std::string dataset_key(const manifests::SampleRecord& record);
 
 // One dataset as ingest reads it: the chosen records where it is curated, without this machine's paths, and
 // the digest of its annotation files and that choice.

@@ -27,6 +27,11 @@ struct DatasetConfig : loaders::formats::DatasetOptions {
   std::filesystem::path
       body_model{};  // checks the file's 3D keypoints (pipeline/candidates/body_check.h); empty does not
   bool keypoints_3d_of_body = false;  // labels get the body's instead of the file's
+  // For those who get the dataset: under which terms pictures and annotations came, from where, and whom to
+  // cite. Shards and dataset.json repeat them.
+  std::string licence{};
+  std::string source_url{};
+  std::string citation{};
 };
 
 struct NetworkConfig {
@@ -46,6 +51,8 @@ struct TtaConfig {
   double reproj_weight = 0.5;
   int iterations_min = 10;
   int iterations_max = 60;
+  double stop_below = 0.0;       // crop units; 0 = never
+  bool refine_retained = false;  // adapt what lies below tau_low too
   int batch = 8;
 };
 

@@ -102,7 +102,18 @@ const Settings<DatasetConfig>& dataset_settings() {
        .description =
            "`file` takes the 3D keypoints of the annotation file as labels; `body` takes those that the "
            "body model computes from pose and shape",
-       .words = {"file", "body"}}};
+       .words = {"file", "body"}},
+      {.key = "licence",
+       .member = &DatasetConfig::licence,
+       .description = "the licence of pictures and annotations, best as an SPDX identifier (`CC-BY-4.0`). "
+                      "The dataset and "
+                      "each of its shards repeat it"},
+      {.key = "source_url",
+       .member = &DatasetConfig::source_url,
+       .description = "where the dataset came from. Repeated likewise"},
+      {.key = "citation",
+       .member = &DatasetConfig::citation,
+       .description = "whom to cite for it, in words or as BibTeX. Repeated likewise"}};
   return kSettings;
 }
 
@@ -201,6 +212,24 @@ const Settings<TtaConfig>& tta_settings() {
        .description = "number of iterations at an initial error of `tau_high`",
        .range = kAtLeastOne,
        .decides = DecidedStage::refine},
+      {.key = "stop_below",
+       .member = &TtaConfig::stop_below,
+       .description =
+           "crop units. Adaptation ends as soon as L_proj is below it; 0 is never, as in the paper. At most "
+           "`tau_low`. A sample that ends there before the tenth iteration is kept without the test of "
+           "`delta`. With the value of `tau_low` it was the rule until version 0.2; it saves time, and "
+           "labels "
+           "are hardly better than predictions (docs/results.md)",
+       .range = kNotNegative,
+       .decides = DecidedStage::refine},
+      {.key = "refine_retained",
+       .member = &TtaConfig::refine_retained,
+       .description =
+           "if true, predictions below `tau_low` are adapted too, for `iterations_min` iterations and "
+           "without "
+           "the test of `delta`. Each is kept in any case: as refined if an iterate is better, else as "
+           "retained. The paper retains them as they are",
+       .decides = DecidedStage::refine},
       {.key = "batch",
        .member = &TtaConfig::batch,
        .description = "samples that are adapted together",
@@ -221,9 +250,7 @@ const Settings<FilterConfig>& filter_settings() {
            "adapted. A build without thresholds stops and names `calibrate`"},
       {.key = "delta",
        .member = &FilterConfig::delta,
-       .description =
-           "relative gain that adaptation must reach within ten iterations, unless L_proj falls below "
-           "`tau_low`"}};
+       .description = "relative gain that adaptation must reach within ten iterations"}};
   return kSettings;
 }
 

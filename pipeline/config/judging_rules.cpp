@@ -34,6 +34,8 @@ filters::Thresholds thresholds_of(const std::string& dataset, const BuildConfig&
   thresholds.delta = given.delta.value_or(config.filter.delta);
   thresholds.iterations_min = config.tta.iterations_min;
   thresholds.iterations_max = config.tta.iterations_max;
+  thresholds.stop_below = config.tta.stop_below;
+  thresholds.refine_retained = config.tta.refine_retained;
   try {
     filters::check(thresholds);
   } catch (const std::invalid_argument& error) {

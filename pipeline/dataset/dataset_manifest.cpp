@@ -144,6 +144,22 @@ ordered_json describe_leakage(const DatasetInputs& inputs) {
           {"pictures_alike_in_pool", leakage->in_groups}};
 }
 
+// Where the samples come from, and under which terms.
+ordered_json describe_datasets(const config::BuildConfig& config) {
+  const auto terms = terms_of_datasets(config);
+  ordered_json datasets = ordered_json::object();
+  for (const config::DatasetConfig& dataset : config.datasets) {
+    const std::string name = dataset.name + "/" + dataset.split;
+    const manifests::DatasetTerms& own = terms.at(name);
+    datasets[name] = {{"format", dataset.format},
+                      {"role", config::to_string(dataset.role)},
+                      {"licence", own.licence},
+                      {"source_url", own.source_url},
+                      {"citation", own.citation}};
+  }
+  return datasets;
+}
+
 ordered_json text_or_null(const std::string& text) {
   return text.empty() ? ordered_json(nullptr) : ordered_json(text);
 }
@@ -151,6 +167,15 @@ ordered_json text_or_null(const std::string& text) {
 // Shortest text that reads back as the same number; empty for NaN.
 std::string number(double value) {
   return std::isnan(value) ? std::string() : fmt::format("{}", value);
+}
+
+// The cells of the trust scores, each after its comma.
+std::string trust_cells(const manifests::TrustScores& trust) {
+  std::string cells;
+  for (const manifests::TrustColumn& column : manifests::kTrustColumns) {
+    cells += "," + number(trust.*column.score);
+  }
+  return cells;
 }
 
 }  // namespace
@@ -171,6 +196,14 @@ void Counts::add(Verdict verdict) {
       ++failed;
       break;
   }
+}
+
+std::map<std::string, manifests::DatasetTerms> terms_of_datasets(const config::BuildConfig& config) {
+  std::map<std::string, manifests::DatasetTerms> terms;
+  for (const config::DatasetConfig& dataset : config.datasets) {
+    terms[dataset.name + "/" + dataset.split] = {dataset.licence, dataset.source_url, dataset.citation};
+  }
+  return terms;
 }
 
 std::string content_id(const std::vector<ShardEntry>& shards) {
@@ -201,6 +234,7 @@ std::string dataset_json(const DatasetInputs& inputs, const std::vector<manifest
                                  {"toolkit", run::version()},
                                  {"counts", to_json(counts)},
                                  {"labels", count_labels(*inputs.ingest, judgements)},
+                                 {"datasets", describe_datasets(*inputs.config)},
                                  {"profile", inputs.config->profile},
                                  {"thresholds", describe_thresholds(inputs)},
                                  {"guards", describe_guards(inputs)},
@@ -228,10 +262,9 @@ std::string dataset_json(const DatasetInputs& inputs, const std::vector<manifest
 
 std::string verdicts_csv(const candidates::Ingest& ingest,
                          const std::vector<manifests::Judgement>& judgements) {
-  std::string text =
-      "id,verdict,reason,initial_error,final_error,gain,iterations,best_iteration,dataset,split,source,"
-      "species,family,"
-      "shard,row,image_sha256,detail\n";
+  std::string text = "id,verdict,reason,initial_error,final_error,gain,iterations,best_iteration";
+  for (const manifests::TrustColumn& column : manifests::kTrustColumns) text.append(",").append(column.name);
+  text += ",dataset,split,source,species,family,shard,row,image_sha256,detail\n";
   for (const candidates::Unit& unit : ingest.units) {
     std::int64_t row = 0;
     for (std::size_t i = unit.first; i < unit.first + unit.count; ++i) {
@@ -239,15 +272,15 @@ std::string verdicts_csv(const candidates::Ingest& ingest,
       const manifests::Judgement& judgement = judgements[i];
       const bool kept = manifests::is_kept(judgement.verdict);
       const bool judged = !std::isnan(judgement.initial_error);
-      text += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", csv_cell(record.id),
-                          manifests::to_string(judgement.verdict), manifests::to_string(judgement.reason),
-                          number(judgement.initial_error), number(judgement.final_error),
-                          number(judgement.gain), judged ? std::to_string(judgement.iterations) : "",
-                          judged ? std::to_string(judgement.best_iteration) : "", csv_cell(record.dataset),
-                          csv_cell(record.split), csv_cell(record.source), csv_cell(record.species),
-                          manifests::to_string(record.family), kept ? std::to_string(unit.index) : "",
-                          kept ? std::to_string(row) : "", ingest.candidates[i].image_sha256,
-                          csv_cell(judgement.detail));
+      text += fmt::format(
+          "{},{},{},{},{},{},{},{}{},{},{},{},{},{},{},{},{},{}\n", csv_cell(record.id),
+          manifests::to_string(judgement.verdict), manifests::to_string(judgement.reason),
+          number(judgement.initial_error), number(judgement.final_error), number(judgement.gain),
+          judged ? std::to_string(judgement.iterations) : "",
+          judged ? std::to_string(judgement.best_iteration) : "", trust_cells(judgement.trust),
+          csv_cell(record.dataset), csv_cell(record.split), csv_cell(record.source), csv_cell(record.species),
+          manifests::to_string(record.family), kept ? std::to_string(unit.index) : "",
+          kept ? std::to_string(row) : "", ingest.candidates[i].image_sha256, csv_cell(judgement.detail));
       if (kept) ++row;
     }
   }

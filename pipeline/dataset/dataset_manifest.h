@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "filters/fidelity.h"
+#include "manifests/shard.h"
 #include "manifests/verdict.h"
 #include "pipeline/candidates/ingest.h"
 #include "pipeline/config/build_config.h"
@@ -64,6 +65,7 @@ struct DatasetManifest {
   std::map<std::string, GroupStatistics> by_species;        // "unknown" where the file names none
   std::map<std::string, filters::Thresholds> thresholds;    // by dataset, of those with pseudo labels
   std::map<std::string, config::Role> roles;                // by "name/split"
+  std::map<std::string, manifests::DatasetTerms> terms;     // by "name/split"; empty in schema 1
   std::size_t unit_size = config::ShardConfig{}.unit_size;  // candidates of one unit, and so of one shard
   stages::StageKeys keys;                                   // `measure` is empty when no bound was on
   std::string checkpoint_sha256;                            // empty, like the two below, without a network
@@ -72,6 +74,9 @@ struct DatasetManifest {
   std::vector<ShardEntry> shards;
   std::string verdicts_sha256;
 };
+
+// What the config says of its datasets' terms, by "name/split".
+std::map<std::string, manifests::DatasetTerms> terms_of_datasets(const config::BuildConfig& config);
 
 // SHA-256 over the shards' digests, one a line, in unit order.
 std::string content_id(const std::vector<ShardEntry>& shards);
@@ -90,7 +95,7 @@ std::string dataset_json(const DatasetInputs& inputs, const std::vector<manifest
                          const std::vector<ShardEntry>& shards, const std::string& verdicts_sha256);
 
 // Text of verdicts.csv: a header and one line a candidate in ingest order. Shard and row are those of the
-// kept ones.
+// kept ones; a trust score that was not measured is an empty cell.
 std::string verdicts_csv(const candidates::Ingest& ingest,
                          const std::vector<manifests::Judgement>& judgements);
 

@@ -65,6 +65,13 @@ void read_thresholds(const json& thresholds, DatasetManifest& manifest) {
   }
 }
 
+void read_terms(const json& datasets, DatasetManifest& manifest) {
+  for (const auto& [name, terms] : datasets.items()) {
+    manifest.terms[name] = {terms.at("licence").get<std::string>(), terms.at("source_url").get<std::string>(),
+                            terms.at("citation").get<std::string>()};
+  }
+}
+
 // The config stands there as the user wrote it: what is absent has its default.
 void read_config(const json& config, DatasetManifest& manifest) {
   for (const json& dataset : config.at("datasets")) {
@@ -103,9 +110,9 @@ DatasetManifest manifest_of(const json& document) {
   DatasetManifest manifest;
   manifest.toolkit = document.value("toolkit", "?");
   manifest.schema = document.at("schema").get<int>();
-  if (manifest.schema != manifests::kShardSchema) {
+  if (manifest.schema < 1 || manifest.schema > manifests::kShardSchema) {
     throw std::runtime_error(
-        fmt::format("schema is {}, this toolkit reads {}; use the toolkit version that wrote it ({})",
+        fmt::format("schema is {}, this toolkit reads 1 to {}; use the toolkit version that wrote it ({})",
                     manifest.schema, manifests::kShardSchema, manifest.toolkit));
   }
   manifest.name = document.at("name").get<std::string>();
@@ -118,6 +125,7 @@ DatasetManifest manifest_of(const json& document) {
   manifest.verdicts_sha256 = document.at("verdicts").at("sha256").get<std::string>();
   read_statistics(document.at("statistics"), manifest);
   read_thresholds(document.at("thresholds"), manifest);
+  if (manifest.schema >= 2) read_terms(document.at("datasets"), manifest);
   read_provenance(document.at("provenance"), manifest);
   for (const json& shard : document.at("shards")) {
     manifest.shards.push_back({shard.at("file").get<std::string>(), shard.at("sha256").get<std::string>(),

@@ -21,13 +21,25 @@ using manifests::Verdict;
   throw std::logic_error(fmt::format("{}: got {}, which is no enumerator", type, value));
 }
 
-// The course of adaptation, which both a kept and a dropped candidate of the middle band have behind it.
+bool is_below_tau_low(const Judgement& judgement, const Thresholds& thresholds) {
+  return judgement.initial_error < thresholds.tau_low;
+}
+
+// The course of adaptation of a candidate that was adapted, whether it was kept or not.
 std::string adaptation(const Judgement& judgement, const Thresholds& thresholds) {
+  const std::string why_adapted =
+      is_below_tau_low(judgement, thresholds)
+          ? fmt::format(
+                "lies below tau_low = {:.4f}, and it was adapted all the same, as tta.refine_retained "
+                "asks for",
+                thresholds.tau_low)
+          : fmt::format("lies between tau_low = {:.4f} and tau_high = {:.4f}, so it was adapted",
+                        thresholds.tau_low, thresholds.tau_high);
   return fmt::format(
-      "L_proj of the prediction, {:.4f}, lies between tau_low = {:.4f} and tau_high = {:.4f}, so it was "
-      "adapted. In {} iterations L_proj fell to {:.4f}, which it reached at iteration {}.",
-      judgement.initial_error, thresholds.tau_low, thresholds.tau_high, judgement.iterations,
-      judgement.final_error, judgement.best_iteration);
+      "L_proj of the prediction, {:.4f}, {}. In {} iterations L_proj fell to {:.4f}, which it reached at "
+      "iteration {}.",
+      judgement.initial_error, why_adapted, judgement.iterations, judgement.final_error,
+      judgement.best_iteration);
 }
 
 std::string gain(const Judgement& judgement, const Thresholds& thresholds, const char* relation) {
@@ -71,13 +83,17 @@ std::string why_kept(const Judgement& judgement, config::Role role,
     throw std::runtime_error("dataset.json has no thresholds for the dataset of a candidate that was kept");
   }
   if (judgement.verdict == Verdict::retained) {
-    return fmt::format("L_proj of the prediction, {:.4f}, lies below tau_low = {:.4f}, so it was kept.",
-                       judgement.initial_error, thresholds->tau_low);
+    return fmt::format("L_proj of the prediction, {:.4f}, lies below tau_low = {:.4f}, so it was kept{}.",
+                       judgement.initial_error, thresholds->tau_low,
+                       judgement.iterations > 0 ? ", and adaptation found nothing better" : "");
   }
-  const std::string decided = judgement.final_error < thresholds->tau_low
-                                  ? std::string("That is below tau_low")
-                                  : gain(judgement, *thresholds, "reaches");
-  return adaptation(judgement, *thresholds) + " " + decided + ", so it was kept.";
+  const std::string course = adaptation(judgement, *thresholds) + " ";
+  if (is_below_tau_low(judgement, *thresholds)) return course + "It is kept with this better body.";
+  if (judgement.gain >= thresholds->delta) {
+    return course + gain(judgement, *thresholds, "reaches") + ", so it was kept.";
+  }
+  // tta.stop_below, or the early end of version 0.1.
+  return course + "Adaptation was told to end there before its gain was asked for, so it was kept.";
 }
 
 }  // namespace

@@ -18,6 +18,10 @@ VerdictReader::VerdictReader(const std::filesystem::path& file)
 
 VerdictReader::Columns VerdictReader::find_columns(const manifests::CsvTableReader& table) {
   const auto at = [&](const char* name) { return table.column(name); };
+  std::array<std::optional<std::size_t>, manifests::kTrustColumns.size()> trust{};
+  for (std::size_t i = 0; i < trust.size(); ++i) {
+    trust[i] = table.find_column(manifests::kTrustColumns[i].name);
+  }
   return {.id = at("id"),
           .verdict = at("verdict"),
           .reason = at("reason"),
@@ -34,7 +38,8 @@ VerdictReader::Columns VerdictReader::find_columns(const manifests::CsvTableRead
           .shard = at("shard"),
           .row = at("row"),
           .image_sha256 = at("image_sha256"),
-          .detail = at("detail")};
+          .detail = at("detail"),
+          .trust = trust};
 }
 
 std::optional<VerdictRow> VerdictReader::next() {
@@ -70,6 +75,10 @@ VerdictRow VerdictReader::parse() const {
   row.judgement.gain = table_.number(at_.gain).value_or(kNaN);
   row.judgement.iterations = static_cast<int>(whole(at_.iterations).value_or(0));
   row.judgement.best_iteration = static_cast<int>(whole(at_.best_iteration).value_or(0));
+  for (std::size_t i = 0; i < at_.trust.size(); ++i) {
+    if (!at_.trust[i]) continue;
+    row.judgement.trust.*manifests::kTrustColumns[i].score = table_.number(*at_.trust[i]).value_or(kNaN);
+  }
   row.dataset = table_.cell(at_.dataset);
   row.split = table_.cell(at_.split);
   row.source = table_.cell(at_.source);

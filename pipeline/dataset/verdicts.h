@@ -1,6 +1,7 @@
 // verdicts.csv of a published dataset, row by row: what became of every candidate.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -49,6 +50,8 @@ class VerdictReader {
   struct Columns {
     std::size_t id, verdict, reason, initial_error, final_error, gain, iterations, best_iteration, dataset,
         split, source, species, family, shard, row, image_sha256, detail;
+    std::array<std::optional<std::size_t>, manifests::kTrustColumns.size()>
+        trust{};  // absent before schema 2
   };
   static Columns find_columns(const manifests::CsvTableReader& table);
   std::optional<std::int64_t> whole(std::size_t column) const;

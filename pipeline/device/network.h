@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "filters/keypoint_choice.h"
+#include "filters/adaptation/schedule.h"
 #include "smal/body.h"
 #include "smal/keypoints.h"
 
@@ -27,14 +27,7 @@ using PatchView = std::span<const std::uint8_t>;  // 256 x 256 x 3 RGB, row-majo
 struct AdaptRequest {
   PatchView patch;
   CropKeypoints keypoints{};
-  int iterations = 10;
-  double stop_below = 0.0;  // crop units; 0 = never
-  double min_gain = 0.0;    // give up after gain_window iterations below this relative gain; 0 = never
-  int gain_window = 10;
-  // Visible keypoints that the objective does not see. Where there are any, the best iterate is the one of
-  // least error on them.
-  filters::KeypointFlags held_out{};
-  int patience = 0;  // stop after so many iterations without a new least held-out error; 0 = never
+  filters::adaptation::Schedule schedule;
 };
 
 struct AdaptOutcome {

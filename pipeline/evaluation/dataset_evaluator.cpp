@@ -138,7 +138,7 @@ class RecordEvaluator {
       request.patch = unit.patches[j];
       request.keypoints = hide_keypoints(unit.targets[j].keypoints, pass.visible_share, instruments_.seed,
                                          results_[unit.samples[j]].id);
-      request.iterations = pass.iterations;
+      request.schedule.iterations = pass.iterations;
     }
     const std::vector<device::AdaptOutcome> outcomes = instruments_.network->adapt(requests, pass.iterates);
     const auto measure_all = [&](auto&& body_of) {

@@ -72,7 +72,7 @@ std::string label_digest(const candidates::Unit& unit, const std::vector<candida
     text +=
         fmt::format("{} {} {}\n", i - unit.first, manifests::to_string(exclusion.reason), exclusion.detail);
   }
-  return text.empty() ? unit.input_digest : manifests::sha256(unit.input_digest + '\n' + text);
+  return text.empty() ? unit.label_digest : manifests::sha256(unit.label_digest + '\n' + text);
 }
 
 }  // namespace

@@ -87,17 +87,6 @@ model::TtaOptions tta_options(const config::TtaConfig& tta) {
   return options;
 }
 
-model::TtaSchedule schedule_of(const device::AdaptRequest& request) {
-  model::TtaSchedule schedule;
-  schedule.iterations = request.iterations;
-  schedule.stop_below = request.stop_below;
-  schedule.min_gain = request.min_gain;
-  schedule.gain_window = request.gain_window;
-  schedule.patience = request.patience;
-  for (std::size_t k = 0; k < request.held_out.size(); ++k) schedule.held_out[k] = request.held_out[k];
-  return schedule;
-}
-
 class TorchNetwork : public device::Network {
  public:
   TorchNetwork(const config::NetworkConfig& network, const config::TtaConfig& tta)
@@ -150,13 +139,13 @@ std::vector<device::AdaptOutcome> TorchNetwork::adapt(std::span<const device::Ad
   for (std::size_t first = 0; first < requests.size(); first += adapt_batch_) {
     const auto batch = requests.subspan(first, std::min(adapt_batch_, requests.size() - first));
     std::vector<device::PatchView> patches;
-    std::vector<model::TtaSchedule> schedules;
+    std::vector<filters::adaptation::Schedule> schedules;
     torch::Tensor keypoints =
         torch::empty({static_cast<std::int64_t>(batch.size()), smal::kNumKeypoints, 3}, torch::kFloat32);
     float* out = keypoints.data_ptr<float>();
     for (const device::AdaptRequest& request : batch) {
       patches.push_back(request.patch);
-      schedules.push_back(schedule_of(request));
+      schedules.push_back(request.schedule);
       const auto numbers = smal::numbers_of(request.keypoints);
       out = std::copy(numbers.begin(), numbers.end(), out);
     }

@@ -22,8 +22,8 @@ using nlohmann::json;
 // Raise a number when a change of the code changes what the stage writes.
 constexpr int kIngestCode = 2;
 constexpr int kPredictCode = 2;
-constexpr int kFidelityCode = 1;
-constexpr int kRefineCode = 1;
+constexpr int kFidelityCode = 2;
+constexpr int kRefineCode = 2;
 constexpr int kMeasureCode = 1;
 constexpr int kCropsCode = 1;
 constexpr int kShardsCode = 1;

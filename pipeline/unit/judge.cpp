@@ -63,13 +63,23 @@ manifests::Judgement judge_refined(const device::CropKeypoints& keypoints, doubl
   if (refined.curve.empty()) {
     return failed(Reason::prediction_not_finite, "nothing could be measured in adaptation");
   }
+  const bool holds_out = guards.held_out_share > 0.0;
+  const bool is_retained = filters::band(error, thresholds) == filters::Band::retain;
+  // With a single visible keypoint nothing could be held out.
+  if (holds_out && refined.held_out_curve.empty() && !is_retained) return nothing_to_hold_out(refined);
+  manifests::Judgement judgement;
+  if (is_retained) {
+    const bool has_held_out = !refined.held_out_curve.empty();
+    judgement = filters::judge_retained(refined.curve, has_held_out ? refined.held_out_curve : refined.curve,
+                                        thresholds);
+  } else if (holds_out) {
+    judgement = filters::judge_held_out(refined.curve, refined.held_out_curve, thresholds);
+  } else {
+    judgement = filters::judge_adapted(refined.curve, thresholds);
+  }
   const int visible = visible_keypoints(keypoints);
-  if (guards.held_out_share > 0.0 && refined.held_out_curve.empty()) return nothing_to_hold_out(refined);
-  manifests::Judgement judgement =
-      guards.held_out_share > 0.0 ? filters::judge_held_out(refined.curve, refined.held_out_curve, thresholds)
-                                  : filters::judge_adapted(refined.curve, thresholds);
   if (visible >= guards.iterations_full_at) return judgement;
-  const int unscaled = filters::adaptation_iterations(error, thresholds);
+  const int unscaled = filters::adaptation_schedule(error, thresholds).iterations;
   const int scaled = filters::scaled_iterations(unscaled, visible, guards.iterations_full_at);
   if (judgement.reason == Reason::gain_too_small && scaled < thresholds.gain_window) {
     judgement.reason = Reason::scaled_gain_too_small;

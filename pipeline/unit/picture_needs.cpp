@@ -39,15 +39,10 @@ Standing standing_of(const UnitWork& work, std::size_t i, const config::JudgingR
   if (candidate.role != config::Role::pseudo) return Standing::may_be_kept;
   if (std::isnan(work.errors[i])) return Standing::finished;
   if (work.refined) return is_kept(work.judgements[i]) ? Standing::may_be_kept : Standing::finished;
-  switch (filters::band(work.errors[i], rules->of(candidate.record.dataset))) {
-    case Band::retain:
-      return Standing::may_be_kept;
-    case Band::refine:
-      return Standing::to_adapt;
-    case Band::discard:
-      return Standing::finished;
-  }
-  return Standing::finished;
+  const filters::Thresholds& thresholds = rules->of(candidate.record.dataset);
+  if (filters::is_adapted(work.errors[i], thresholds)) return Standing::to_adapt;
+  return filters::band(work.errors[i], thresholds) == Band::retain ? Standing::may_be_kept
+                                                                   : Standing::finished;
 }
 
 }  // namespace

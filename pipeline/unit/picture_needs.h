@@ -13,7 +13,7 @@ namespace q3d::pipeline::unit {
 // How far a candidate has come when its unit is decoded.
 enum class Standing : std::uint8_t {
   unpredicted,  // its picture must be decoded, if only to learn whether it can be
-  to_adapt,     // its prediction lies in the middle band and has not been adapted
+  to_adapt,     // the rule adapts its prediction, which has not been done
   may_be_kept,  // no verdict so far drops it
   finished,     // it failed, it was dropped, or the run makes predictions only
 };

@@ -13,17 +13,15 @@ device::AdaptRequest adapt_request(const std::string& id, const device::CropKeyp
   device::AdaptRequest request;
   request.patch = patch;
   request.keypoints = keypoints;
+  request.schedule = filters::adaptation_schedule(error, thresholds);
   const int visible = visible_keypoints(request.keypoints);
-  request.iterations = filters::scaled_iterations(filters::adaptation_iterations(error, thresholds), visible,
-                                                  guards.iterations_full_at);
-  request.stop_below = thresholds.tau_low;
-  request.min_gain = thresholds.delta;
-  request.gain_window = thresholds.gain_window;
+  request.schedule.iterations =
+      filters::scaled_iterations(request.schedule.iterations, visible, guards.iterations_full_at);
   if (guards.held_out_share == 0.0) return request;
-  request.held_out =
+  request.schedule.held_out =
       filters::held_out_keypoints(request.keypoints, guards.held_out_share, guards.held_out_seed, id);
-  request.patience = guards.held_out_patience;
-  if (visible < 2) request.iterations = 0;
+  request.schedule.patience = guards.held_out_patience;
+  if (visible < 2) request.schedule.iterations = 0;
   return request;
 }
 
@@ -35,7 +33,7 @@ void refine_unit(UnitWork& work, const NetworkSource& network, const config::Jud
     const candidates::Candidate& candidate = work.candidates[i];
     if (candidate.role != config::Role::pseudo || std::isnan(work.errors[i])) continue;
     const filters::Thresholds& thresholds = rules.of(candidate.record.dataset);
-    if (filters::band(work.errors[i], thresholds) != filters::Band::refine) continue;
+    if (!filters::is_adapted(work.errors[i], thresholds)) continue;
     requests.push_back(adapt_request(candidate.record.id, work.keypoints[i], work.decoded[i].patch,
                                      work.errors[i], thresholds, rules.guards));
     samples.emplace_back().sample = i;

@@ -48,19 +48,69 @@ TEST(Fidelity, EqualThresholdsLeaveNoMiddleBand) {
 
 TEST(Fidelity, IterationsGrowLinearlyAndRoundHalvesUp) {
   const Thresholds t = make_thresholds();
-  EXPECT_EQ(adaptation_iterations(0.25, t), 10);
-  EXPECT_EQ(adaptation_iterations(0.5, t), 35);
-  EXPECT_EQ(adaptation_iterations(std::nextafter(0.75, 0.0), t), 60);
+  EXPECT_EQ(adaptation_schedule(0.25, t).iterations, 10);
+  EXPECT_EQ(adaptation_schedule(0.5, t).iterations, 35);
+  EXPECT_EQ(adaptation_schedule(std::nextafter(0.75, 0.0), t).iterations, 60);
   // 10 + 50 (0.28125 - 0.25) / 0.5 = 13.125; with 0.2578125: 10.78125.
-  EXPECT_EQ(adaptation_iterations(0.28125, t), 13);
-  EXPECT_EQ(adaptation_iterations(0.2578125, t), 11);
+  EXPECT_EQ(adaptation_schedule(0.28125, t).iterations, 13);
+  EXPECT_EQ(adaptation_schedule(0.2578125, t).iterations, 11);
   Thresholds short_range = t;
   short_range.iterations_max = 14;  // 10 + 4 * 0.125 = 10.5; 10 + 4 * 0.375 = 11.5
-  EXPECT_EQ(adaptation_iterations(0.3125, short_range), 11);
-  EXPECT_EQ(adaptation_iterations(0.4375, short_range), 12);
-  EXPECT_THROW(adaptation_iterations(0.75, t), std::invalid_argument);
-  EXPECT_THROW(adaptation_iterations(0.125, t), std::invalid_argument);
-  EXPECT_THROW(adaptation_iterations(kNan, t), std::invalid_argument);
+  EXPECT_EQ(adaptation_schedule(0.3125, short_range).iterations, 11);
+  EXPECT_EQ(adaptation_schedule(0.4375, short_range).iterations, 12);
+  EXPECT_THROW(adaptation_schedule(0.75, t), std::invalid_argument);
+  EXPECT_THROW(adaptation_schedule(0.125, t), std::invalid_argument);
+  EXPECT_THROW(adaptation_schedule(kNan, t), std::invalid_argument);
+}
+
+TEST(Fidelity, TauLowDoesNotEndAdaptation) {
+  Thresholds t = make_thresholds();
+  const adaptation::Schedule schedule = adaptation_schedule(0.5, t);
+  EXPECT_EQ(schedule.stop_below, 0.0);
+  EXPECT_EQ(schedule.min_gain, 0.25) << "delta";
+  EXPECT_EQ(schedule.gain_window, 10);
+  // Iterate 1 lies below tau_low = 0.25 already; 35 iterations are taken all the same.
+  EXPECT_FALSE(adaptation::is_finished(schedule, std::vector{0.5, 0.125}, 1));
+  t.stop_below = 0.25;
+  EXPECT_TRUE(adaptation::is_finished(adaptation_schedule(0.5, t), std::vector{0.5, 0.125}, 1));
+}
+
+TEST(Fidelity, RetainedSamplesAreAdaptedOnRequestOnly) {
+  Thresholds t = make_thresholds();
+  EXPECT_FALSE(is_adapted(0.125, t));
+  EXPECT_TRUE(is_adapted(0.25, t));
+  EXPECT_FALSE(is_adapted(0.75, t));
+  t.refine_retained = true;
+  EXPECT_TRUE(is_adapted(0.125, t));
+  EXPECT_TRUE(is_adapted(0.25, t));
+  EXPECT_FALSE(is_adapted(0.75, t));
+  EXPECT_FALSE(is_adapted(kNan, t));
+  const adaptation::Schedule schedule = adaptation_schedule(0.125, t);
+  EXPECT_EQ(schedule.iterations, 10);
+  EXPECT_EQ(schedule.min_gain, 0.0) << "no test of the gain";
+}
+
+TEST(Fidelity, AnAdaptedRetainedSampleIsRefinedIfItBecameBetter) {
+  Thresholds t = make_thresholds();
+  t.refine_retained = true;
+  const std::vector<double> better{0.125, 0.1171875, 0.12};  // a gain of 0.0625, below delta
+  const Judgement refined = judge_retained(better, better, t);
+  EXPECT_EQ(refined.verdict, Verdict::refined);
+  EXPECT_EQ(refined.best_iteration, 1);
+  EXPECT_EQ(refined.final_error, 0.1171875);
+  EXPECT_EQ(refined.gain, 0.0625);
+  const std::vector<double> worse{0.125, 0.15, 0.25};
+  const Judgement retained = judge_retained(worse, worse, t);
+  EXPECT_EQ(retained.verdict, Verdict::retained);
+  EXPECT_EQ(retained.reason, Reason::none);
+  EXPECT_EQ(retained.best_iteration, 0);
+  EXPECT_EQ(retained.iterations, 2);
+  EXPECT_EQ(retained.final_error, 0.125);
+  const std::vector<double> held_out{0.5, 0.25, 0.75};
+  EXPECT_EQ(judge_retained(better, held_out, t).best_iteration, 1);
+  EXPECT_EQ(judge_retained(better, std::vector{0.5, 0.5, 0.75}, t).verdict, Verdict::retained);
+  EXPECT_THROW(judge_retained(better, std::vector{0.5}, t), std::invalid_argument);
+  EXPECT_EQ(judge_retained({}, {}, t).reason, Reason::prediction_not_finite);
 }
 
 TEST(Fidelity, RetainsBelowTauLow) {
@@ -140,19 +190,27 @@ TEST(Fidelity, TheGainIsMeasuredWithinTheWindowOnly) {
   EXPECT_EQ(in_time.best_iteration, 11) << "the kept iterate may lie beyond the window";
 }
 
-TEST(Fidelity, ACurveBelowTauLowPassesWithASmallGain) {
+TEST(Fidelity, ASmallGainDiscardsBelowTauLowToo) {
   // From 0.28125 to just below 0.25: a gain of 0.11.
   const double below = std::nextafter(0.25, 0.0);
   const Judgement judgement = judge_adapted(std::vector{0.28125, below, 0.3}, make_thresholds());
-  EXPECT_EQ(judgement.verdict, Verdict::refined);
-  EXPECT_LT(judgement.gain, 0.25);
+  EXPECT_EQ(judgement.verdict, Verdict::discarded);
+  EXPECT_EQ(judgement.reason, Reason::gain_too_small);
   EXPECT_EQ(judgement.final_error, below);
-  const Judgement at_tau_low = judge_adapted(std::vector{0.28125, 0.25, 0.3}, make_thresholds());
-  EXPECT_EQ(at_tau_low.verdict, Verdict::discarded) << "tau_low itself is not below";
+}
 
+TEST(Fidelity, AnEarlyEndBelowStopBelowSkipsTheTestOfTheGain) {
+  Thresholds t = make_thresholds();
+  t.stop_below = 0.25;
+  const double below = std::nextafter(0.25, 0.0);
+  const Judgement early = judge_adapted(std::vector{0.28125, below}, t);
+  EXPECT_EQ(early.verdict, Verdict::refined);
+  EXPECT_LT(early.gain, 0.25);
+  EXPECT_EQ(judge_adapted(std::vector{0.28125, 0.25}, t).verdict, Verdict::discarded)
+      << "stop_below itself is not below";
   std::vector<double> late(13, 0.28125);
   late[12] = below;
-  EXPECT_EQ(judge_adapted(late, make_thresholds()).verdict, Verdict::refined) << "at any iterate";
+  EXPECT_EQ(judge_adapted(late, t).verdict, Verdict::discarded) << "after the window the gain was asked for";
 }
 
 TEST(Fidelity, TheBestIterateMayBeThePredictionAndTheFirstOfEqualOnesCounts) {
@@ -208,6 +266,8 @@ TEST(Fidelity, ChecksThresholdsOneByOne) {
   expect_refused([](auto& t) { t.gain_window = 0; }, "gain_window >= 1");
   expect_refused([](auto& t) { t.iterations_min = 0; }, "iterations_min >= 1");
   expect_refused([](auto& t) { t.iterations_max = 9; }, "iterations_min <= iterations_max");
+  expect_refused([](auto& t) { t.stop_below = -0.1; }, "0 <= stop_below");
+  expect_refused([](auto& t) { t.stop_below = 0.26; }, "stop_below <= tau_low");
 }
 
 }  // namespace

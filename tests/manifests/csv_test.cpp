@@ -62,6 +62,8 @@ TEST(Csv, NamesTheLine) {
 TEST(CsvTable, FindsColumnsByName) {
   CsvTableReader table("id,later,value\na,x,1.5\nb,y,\n", "t.csv");
   const std::size_t value = table.column("value");
+  EXPECT_EQ(table.find_column("later"), 1U);
+  EXPECT_EQ(table.find_column("never"), std::nullopt);
   ASSERT_TRUE(table.next());
   EXPECT_EQ(table.cell(table.column("id")), "a");
   EXPECT_EQ(table.number(value), 1.5);

@@ -50,6 +50,9 @@ NUMBERS = {  # name: (values, dtype)
     "gain": ([math.nan, 0.5, 0.5], "<f8"),
     "iterations": ([0, 10, 20], "<i4"),
     "best_iteration": ([0, 7, 14], "<i4"),
+    **{name: ([math.nan, 115 + c / 8, 215 + c / 8], "<f8") for c, name in enumerate([
+        "trust", "trust_mirror", "trust_aux_2d", "trust_aux_3d", "trust_pose_prior", "trust_shape_prior",
+        "trust_limbs", "trust_sides", "trust_mask", "trust_visible"])},
     "has_pose": ([1, 1, 1], "|u1"),
     "has_betas": ([0, 0, 0], "|u1"),
     "has_keypoints_3d": ([0, 1, 0], "|u1"),
@@ -80,7 +83,7 @@ BLOBS = {
 
 ATTRIBUTES = {
     "format": "quadruped3d-shard",
-    "schema": "1",
+    "schema": "2",
     "dataset": "quadruped3d",
     "version": "0123456789ab",
     "unit": "42",
@@ -96,7 +99,14 @@ def check_attributes(shard):
     assert shard.attrs["rows"] == ROWS
     for name, value in ATTRIBUTES.items():
         assert shard.attrs[name].decode() == value, (name, shard.attrs[name])
-    assert set(shard.attrs) == set(ATTRIBUTES) | {"rows", "columns"}
+    assert set(shard.attrs) == set(ATTRIBUTES) | {"rows", "columns", "keypoint_names", "datasets"}
+    names = json.loads(shard.attrs["keypoint_names"])
+    assert len(names) == 26 and names[0] == "left_eye" and names[19] == "tail_tip" and names[25] == "tail_mid", names
+    assert json.loads(shard.attrs["datasets"]) == {
+        "wild/test": {"licence": "", "source_url": "", "citation": ""},
+        "world/train": {"licence": "CC0-1.0", "source_url": "https://example.org/world",
+                        "citation": 'The "world" of 2026'},
+    }
 
 
 def check_numbers(shard):

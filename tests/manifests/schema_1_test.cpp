@@ -156,6 +156,10 @@ TEST_F(Schema1, Judgements) {
     EXPECT_EQ(judgement.iterations, iterations[row]);
     EXPECT_EQ(judgement.best_iteration, best_iterations[row]);
   }
+  for (const TrustColumn& column : kTrustColumns) {
+    EXPECT_TRUE(std::isnan(shard_.samples[1].judgement.trust.*column.score))
+        << "schema 1 has no " << column.name;
+  }
   EXPECT_TRUE(std::isnan(shard_.samples[0].judgement.gain));
   EXPECT_EQ(shard_.samples[1].judgement.gain, 0.5);
   EXPECT_EQ(shard_.samples[2].judgement.gain, 0.5);

@@ -63,6 +63,13 @@ inline manifests::ShardSample make_shard_sample(int row) {
   if (row > 0) sample.judgement.gain = 0.5;
   sample.judgement.iterations = 10 * row;
   sample.judgement.best_iteration = 7 * row;
+  if (row > 0) {  // column c is 15 + c / 8 above 100 r
+    double at = 15.0 + 100.0 * row;
+    for (const TrustColumn& column : kTrustColumns) {
+      sample.judgement.trust.*column.score = at;
+      at += 0.125;
+    }
+  }
 
   sample.has_pose = true;
   sample.has_keypoints_3d = row == 1;
@@ -97,6 +104,8 @@ inline manifests::ShardHeader make_shard_header() {
   header.version = "0123456789ab";
   header.unit = 42;
   header.image_encoding = manifests::ImageEncoding::png;
+  header.datasets["world/train"] = {"CC0-1.0", "https://example.org/world", "The \"world\" of 2026"};
+  header.datasets["wild/test"] = {};
   return header;
 }
 

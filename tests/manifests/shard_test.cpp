@@ -60,6 +60,13 @@ void expect_equal(const ShardSample& got, const ShardSample& expected) {
   }
   EXPECT_EQ(got.judgement.iterations, expected.judgement.iterations);
   EXPECT_EQ(got.judgement.best_iteration, expected.judgement.best_iteration);
+  for (const TrustColumn& column : kTrustColumns) {
+    const double score = expected.judgement.trust.*column.score;
+    EXPECT_EQ(std::isnan(got.judgement.trust.*column.score), std::isnan(score)) << column.name;
+    if (!std::isnan(score)) {
+      EXPECT_EQ(got.judgement.trust.*column.score, score) << column.name;
+    }
+  }
   EXPECT_EQ(got.image_width_px, expected.image_width_px);
   EXPECT_EQ(got.image_height_px, expected.image_height_px);
   EXPECT_EQ(got.crop, expected.crop);
@@ -105,11 +112,12 @@ TEST_F(ShardTest, ReadsBackEverythingButAbsolutePaths) {
   const std::string digest = write();
   EXPECT_EQ(digest, sha256_file(path_));
   const Shard shard = read_shard(path_);
-  EXPECT_EQ(shard.header.schema, 1);
+  EXPECT_EQ(shard.header.schema, 2);
   EXPECT_EQ(shard.header.dataset, "quadruped3d");
   EXPECT_EQ(shard.header.version, "0123456789ab");
   EXPECT_EQ(shard.header.unit, 42);
   EXPECT_EQ(shard.header.image_encoding, ImageEncoding::png);
+  EXPECT_EQ(shard.header.datasets, testing::make_shard_header().datasets);
   const auto expected = testing::make_shard_samples();
   ASSERT_EQ(shard.samples.size(), expected.size());
   for (std::size_t row = 0; row < expected.size(); ++row) {
@@ -179,15 +187,16 @@ TEST_F(ShardTest, ChecksMagicThenSchemaThenCompleteness) {
   EXPECT_THAT([&] { read_shard(path_); }, ThrowsMessage<std::runtime_error>(HasSubstr("not an HDF5 file")));
   const auto later_schema_and_foreign = [](Table& t) {
     t.attributes["format"] = "other";
-    t.attributes["schema"] = "2";
+    t.attributes["schema"] = "3";
     t.numeric.clear();
   };
   expect_refused(later_schema_and_foreign, "attribute format is \"other\"");
   const auto later_schema = [](Table& t) {
-    t.attributes["schema"] = "2";
+    t.attributes["schema"] = "3";
     t.numeric.clear();
   };
-  expect_refused(later_schema, "shard schema 2, but this program reads schema 1");
+  expect_refused(later_schema, "shard schema 3, but this program reads schemas 1 to 2");
+  expect_refused([](Table& t) { t.attributes["schema"] = "01"; }, "shard schema 01");
   expect_refused([](Table& t) { t.attributes.erase("format"); }, "attribute format is absent");
   expect_refused([](Table& t) { t.attributes.erase("schema"); }, "shard schema absent");
 }
@@ -202,8 +211,12 @@ TEST_F(ShardTest, RefusesEachColumnThatIsAbsent) {
   }
 }
 
-TEST_F(ShardTest, RefusesWhatSchema1DoesNotKnow) {
-  expect_refused([](Table& t) { t.text["extra"] = {"", "", ""}; }, "column extra is not in schema 1");
+TEST_F(ShardTest, RefusesWhatItsSchemaDoesNotKnow) {
+  expect_refused([](Table& t) { t.text["extra"] = {"", "", ""}; }, "column extra is not in schema 2");
+  expect_refused([](Table& t) { t.attributes["schema"] = "1"; }, "column trust is not in schema 1");
+  expect_refused([](Table& t) { t.attributes["keypoint_names"] = "[\"nose\"]"; },
+                 "attribute keypoint_names is [\"nose\"], expected [\"left_eye\"");
+  expect_refused([](Table& t) { t.attributes["datasets"] = "{\"a/b\": {}}"; }, "attribute datasets");
   expect_refused(
       [](Table& t) {
         t.numeric["pose"].row_shape = {35, 9};

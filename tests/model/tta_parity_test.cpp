@@ -16,6 +16,8 @@
 namespace q3d::model {
 namespace {
 
+using filters::adaptation::Schedule;
+
 using testing::expect_close;
 using testing::few_roundings;
 using testing::kFloat32Factor;
@@ -59,11 +61,10 @@ TensorMap adapted(const Case& which, const Prima& prima, std::int64_t first, std
   TtaOptions options;
   options.objective = objective;
   options.learning_rate = std::stod(rate);
-  TtaSchedule schedule;
+  Schedule schedule;
   schedule.iterations = iterations;
-  const TtaResult result =
-      adapt(prima, features, file.tensor("gt_keypoints").narrow(0, first, count),
-            std::vector<TtaSchedule>(static_cast<std::size_t>(count), schedule), options);
+  const TtaResult result = adapt(prima, features, file.tensor("gt_keypoints").narrow(0, first, count),
+                                 std::vector<Schedule>(static_cast<std::size_t>(count), schedule), options);
   const Prediction before = prima.predict(features);
   TensorMap all;
   for (std::int64_t i = 0; i < count; ++i) {

@@ -15,6 +15,8 @@
 namespace q3d::model {
 namespace {
 
+using filters::adaptation::Schedule;
+
 constexpr double kBatchNoise = 2e-4;  // of rotations, after some steps at a large rate
 
 struct Samples {
@@ -35,17 +37,17 @@ class Tta : public ::testing::Test {
     return options;
   }
 
-  static TtaSchedule steps(int iterations) {
-    TtaSchedule schedule;
+  static Schedule steps(int iterations) {
+    Schedule schedule;
     schedule.iterations = iterations;
     return schedule;
   }
 
-  static std::vector<TtaSchedule> all(const TtaSchedule& schedule) {
-    return std::vector<TtaSchedule>(static_cast<std::size_t>(samples_->keypoints.size(0)), schedule);
+  static std::vector<Schedule> all(const Schedule& schedule) {
+    return std::vector<Schedule>(static_cast<std::size_t>(samples_->keypoints.size(0)), schedule);
   }
 
-  static TtaResult run(const torch::Tensor& keypoints, const std::vector<TtaSchedule>& schedules) {
+  static TtaResult run(const torch::Tensor& keypoints, const std::vector<Schedule>& schedules) {
     return adapt(samples_->prima, samples_->features, keypoints, schedules, fast());
   }
 
@@ -111,7 +113,7 @@ TEST_F(Tta, SnapshotsAreTheIteratesAskedFor) {
 
 // Four lengths in one batch, so slots are emptied and refilled; each as if it had run alone.
 TEST_F(Tta, InstancesDoNotFeelTheirBatchMates) {
-  const std::vector<TtaSchedule> schedules{steps(3), steps(12), steps(0), steps(7)};
+  const std::vector<Schedule> schedules{steps(3), steps(12), steps(0), steps(7)};
   const TtaResult together = run(samples_->keypoints, schedules);
   for (std::int64_t i = 0; i < 4; ++i) {
     const auto index = static_cast<std::size_t>(i);
@@ -133,7 +135,7 @@ TEST_F(Tta, InstancesDoNotFeelTheirBatchMates) {
 
 TEST_F(Tta, StopsBelowTheThreshold) {
   const TtaResult free = run(samples_->keypoints, all(steps(12)));
-  std::vector<TtaSchedule> schedules = all(steps(12));
+  std::vector<Schedule> schedules = all(steps(12));
   for (std::size_t i = 0; i < schedules.size(); ++i) {
     // Between the first iterate and the best one, or never reached where nothing improves.
     const double least = *std::min_element(free.l_proj[i].begin(), free.l_proj[i].end());
@@ -150,13 +152,13 @@ TEST_F(Tta, StopsBelowTheThreshold) {
 }
 
 TEST_F(Tta, StopsAtOnceWhenAlreadyBelow) {
-  TtaSchedule schedule = steps(12);
+  Schedule schedule = steps(12);
   schedule.stop_below = 10.0;
   for (const auto& curve : run(samples_->keypoints, all(schedule)).l_proj) EXPECT_EQ(curve.size(), 1U);
 }
 
 TEST_F(Tta, GivesUpWithoutGain) {
-  TtaSchedule schedule = steps(12);
+  Schedule schedule = steps(12);
   schedule.gain_window = 4;
   schedule.min_gain = 0.999;
   for (const auto& curve : run(samples_->keypoints, all(schedule)).l_proj) EXPECT_EQ(curve.size(), 5U);
@@ -183,11 +185,11 @@ std::vector<std::vector<std::int64_t>> first_visible(const torch::Tensor& keypoi
 // visible ones and of the held-out ones alone.
 TEST_F(Tta, HeldOutKeypointsAreMeasuredAndNotFitted) {
   const auto held_out = first_visible(samples_->keypoints, 2);
-  std::vector<TtaSchedule> schedules = all(steps(6));
+  std::vector<Schedule> schedules = all(steps(6));
   torch::Tensor hidden = samples_->keypoints.clone();
   for (std::size_t i = 0; i < held_out.size(); ++i) {
     for (const std::int64_t k : held_out[i]) {
-      schedules[i].held_out.set(static_cast<std::size_t>(k));
+      schedules[i].held_out[static_cast<std::size_t>(k)] = true;
       hidden[static_cast<std::int64_t>(i)][k][2] = 0.0;
     }
   }
@@ -212,9 +214,9 @@ TEST_F(Tta, HeldOutKeypointsAreMeasuredAndNotFitted) {
 
 TEST_F(Tta, TheBestIterateIsThatOfTheHeldOutKeypoints) {
   const auto held_out = first_visible(samples_->keypoints, 2);
-  std::vector<TtaSchedule> schedules = all(steps(12));
+  std::vector<Schedule> schedules = all(steps(12));
   for (std::size_t i = 0; i < 3; ++i) {  // the last instance holds out none
-    for (const std::int64_t k : held_out[i]) schedules[i].held_out.set(static_cast<std::size_t>(k));
+    for (const std::int64_t k : held_out[i]) schedules[i].held_out[static_cast<std::size_t>(k)] = true;
   }
   const TtaResult result = run(samples_->keypoints, schedules);
   for (std::size_t i = 0; i < 4; ++i) {
@@ -236,12 +238,12 @@ TEST_F(Tta, TheBestIterateIsThatOfTheHeldOutKeypoints) {
 
 TEST_F(Tta, PatienceEndsWithTheHeldOutError) {
   const auto held_out = first_visible(samples_->keypoints, 2);
-  std::vector<TtaSchedule> schedules = all(steps(12));
+  std::vector<Schedule> schedules = all(steps(12));
   for (std::size_t i = 0; i < 4; ++i) {
-    for (const std::int64_t k : held_out[i]) schedules[i].held_out.set(static_cast<std::size_t>(k));
+    for (const std::int64_t k : held_out[i]) schedules[i].held_out[static_cast<std::size_t>(k)] = true;
   }
   const TtaResult free = run(samples_->keypoints, schedules);
-  for (TtaSchedule& schedule : schedules) schedule.patience = 2;
+  for (Schedule& schedule : schedules) schedule.patience = 2;
   const TtaResult stopped = run(samples_->keypoints, schedules);
   for (std::size_t i = 0; i < 4; ++i) {
     std::size_t best = 0;
@@ -335,8 +337,8 @@ TEST_F(Tta, WrongArgumentsAreRefused) {
   EXPECT_THROW(run(keypoints.narrow(0, 0, 3), all(steps(1))), std::invalid_argument);
   EXPECT_THROW(run(keypoints, {steps(1)}), std::invalid_argument);
   EXPECT_THROW(run(keypoints, all(steps(-1))), std::invalid_argument);
-  TtaSchedule all_held_out = steps(1);
-  all_held_out.held_out.set();
+  Schedule all_held_out = steps(1);
+  all_held_out.held_out.fill(true);
   EXPECT_THROW(run(keypoints, all(all_held_out)), std::invalid_argument);
   TtaOptions options = fast();
   options.learning_rate = std::numeric_limits<double>::quiet_NaN();

@@ -79,7 +79,7 @@ fs::path make_dataset(const fs::path& folder) {
   fs::create_directories(version / "shards");
   std::string digests;
   json document = {{"format", "quadruped3d-dataset"},
-                   {"schema", 1},
+                   {"schema", 2},
                    {"name", "made"},
                    {"version", "1.0.0"},
                    {"toolkit", "0.2.0"},
@@ -89,6 +89,10 @@ fs::path make_dataset(const fs::path& folder) {
   document["shards"] = write_shards(version, digests);
   document["content_id"] = manifests::sha256(digests);
   document["labels"] = {{"truth", 0}, {"retained", 0}, {"refined", 0}, {"2d_only", 2}};
+  document["datasets"] = {
+      {"zoo/train",
+       {{"licence", "CC-BY-4.0"}, {"source_url", "https://example.org/zoo"}, {"citation", "A zoo"}}},
+      {"pool/test", {{"licence", ""}, {"source_url", ""}, {"citation", ""}}}};
   document["thresholds"] = {{"pool", {{"tau_low", 0.04}, {"tau_high", 0.08}, {"delta", 0.05}}}};
   document["statistics"] = {
       {"all", counts(4, 2, 1, 1)},

@@ -87,6 +87,20 @@ TEST_F(Published, GivesDatasetJsonAsTypedValues) {
   EXPECT_FALSE(manifest.all.mean_final_error);
 }
 
+TEST_F(Published, KnowsTheTermsOfItsDatasets) {
+  EXPECT_EQ(read_dataset_manifest(version_).terms.at("zoo/train"),
+            (manifests::DatasetTerms{"CC-BY-4.0", "https://example.org/zoo", "A zoo"}));
+}
+
+TEST_F(Published, ReadsADatasetOfSchema1AndRefusesALaterOne) {
+  replace("\"schema\": 2", "\"schema\": 1");
+  replace("\"datasets\": {", "\"not_in_schema_1\": {");
+  EXPECT_TRUE(read_dataset_manifest(version_).terms.empty());
+  replace("\"schema\": 1", "\"schema\": 3");
+  EXPECT_THAT(message([&] { PublishedDataset{version_}; }),
+              HasSubstr("schema is 3, this toolkit reads 1 to 2"));
+}
+
 TEST_F(Published, KnowsRoleLabelAndPlaceOfACandidate) {
   const PublishedDataset dataset(version_);
   const VerdictRow kept = dataset.verdict("zoo/train/d.jpg#3");

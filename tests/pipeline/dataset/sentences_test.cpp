@@ -90,14 +90,39 @@ TEST(Why, NamesTheNumbersThatDecided) {
       why(judgement(Verdict::discarded, Reason::gain_too_small), Role::pseudo, kThresholds),
       ::testing::AllOf(HasSubstr("In 30 iterations L_proj fell to 0.0500, which it reached at iteration 17."),
                        HasSubstr("2.00 %, is less than delta = 5.00 %.")));
-  EXPECT_EQ(why(judgement(Verdict::retained, Reason::none), Role::pseudo, kThresholds),
-            "L_proj of the prediction, 0.0600, lies below tau_low = 0.0400, so it was kept.");
+  Judgement retained = judgement(Verdict::retained, Reason::none);
+  retained.initial_error = 0.03;
+  retained.iterations = 0;
+  EXPECT_EQ(why(retained, Role::pseudo, kThresholds),
+            "L_proj of the prediction, 0.0300, lies below tau_low = 0.0400, so it was kept.");
   Judgement refined = judgement(Verdict::refined, Reason::none);
   refined.gain = 0.12;
   EXPECT_THAT(why(refined, Role::pseudo, kThresholds),
               HasSubstr("12.00 %, reaches delta = 5.00 %, so it was kept."));
   refined.final_error = 0.03;
-  EXPECT_THAT(why(refined, Role::pseudo, kThresholds), HasSubstr("That is below tau_low, so it was kept."));
+  EXPECT_THAT(why(refined, Role::pseudo, kThresholds), HasSubstr("12.00 %, reaches delta"))
+      << "the gain decides, wherever L_proj ends";
+  refined.gain = 0.02;
+  EXPECT_THAT(why(refined, Role::pseudo, kThresholds),
+              HasSubstr("told to end there before its gain was asked for, so it was kept."));
+}
+
+TEST(Why, TellsHowARetainedPredictionWasAdapted) {
+  Judgement better = judgement(Verdict::refined, Reason::none);
+  better.initial_error = 0.03;
+  better.final_error = 0.02;
+  EXPECT_EQ(
+      why(better, Role::pseudo, kThresholds),
+      "L_proj of the prediction, 0.0300, lies below tau_low = 0.0400, and it was adapted all the same, as "
+      "tta.refine_retained asks for. In 30 iterations L_proj fell to 0.0200, which it reached at iteration "
+      "17. It is kept with this better body.");
+  Judgement no_better = judgement(Verdict::retained, Reason::none);
+  no_better.initial_error = no_better.final_error = 0.03;
+  no_better.best_iteration = 0;
+  EXPECT_EQ(
+      why(no_better, Role::pseudo, kThresholds),
+      "L_proj of the prediction, 0.0300, lies below tau_low = 0.0400, so it was kept, and adaptation found "
+      "nothing better.");
 }
 
 TEST(Why, TellsTheDetailOfAGuardOfTheUserAndOfAFailure) {

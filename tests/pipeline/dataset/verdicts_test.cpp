@@ -61,6 +61,25 @@ TEST_F(Verdicts, AreReadAsEnumeratorsAndNumbers) {
   EXPECT_EQ(rows[3].label->row, 0);
 }
 
+TEST_F(Verdicts, TrustScoresAreReadWhereTheFileHasThem) {
+  EXPECT_TRUE(std::isnan(read(kVerdicts)[0].judgement.trust.combined)) << "a file from before schema 2";
+  std::string text = kVerdicts;
+  const auto put = [&](const std::string& after, const std::string& more) {
+    text.insert(text.find(after) + after.size(), more);
+  };
+  put("best_iteration", ",trust,trust_mirror");
+  put("zoo/train/a.jpg#0,retained,none,,,,,", ",0.75,31.5");
+  put("zoo/train/b.jpg#1,failed,image_empty,,,,,", ",,");
+  put("pool/test/c.jpg#2,discarded,error_too_large,0.09,0.09,,0,0", ",,");
+  put("zoo/train/d.jpg#3,retained,none,,,,,", ",,");
+  const std::vector<VerdictRow> rows = read(text);
+  EXPECT_EQ(rows[0].judgement.trust.combined, 0.75);
+  EXPECT_EQ(rows[0].judgement.trust.mirror, 31.5);
+  EXPECT_TRUE(std::isnan(rows[0].judgement.trust.aux_2d));
+  EXPECT_TRUE(std::isnan(rows[2].judgement.trust.combined));
+  EXPECT_EQ(rows[2].dataset, "pool");
+}
+
 TEST_F(Verdicts, RefusesWhatIsNoVerdict) {
   EXPECT_THAT(message("retained,none", "kept,none"), HasSubstr("line 2: got unknown verdict \"kept\""));
   EXPECT_THAT(message("error_too_large", "too_bad"), HasSubstr("line 4: got unknown reason \"too_bad\""));

@@ -95,10 +95,10 @@ TEST(GuardedJudging, IterationsAreScaledByVisibleKeypoints) {
   GivenUnit unit;
   unit.add(5, kError);
   // In a quarter of the middle band: 10 + 50 / 4 = 22.5, up to 23.
-  EXPECT_EQ(unit.request().iterations, 23);
-  EXPECT_FALSE(unit.request().held_out[0]);
+  EXPECT_EQ(unit.request().schedule.iterations, 23);
+  EXPECT_FALSE(unit.request().schedule.held_out[0]);
   unit.rules.guards.iterations_full_at = 20;
-  EXPECT_EQ(unit.request().iterations, 6) << "23 * 5 / 20 = 5.75";
+  EXPECT_EQ(unit.request().schedule.iterations, 6) << "23 * 5 / 20 = 5.75";
   unit.refine(0, {0.25, 0.245, 0.245});
   const Judgement judgement = unit.judge();
   EXPECT_EQ(judgement.reason, Reason::scaled_gain_too_small);
@@ -110,7 +110,7 @@ TEST(GuardedJudging, ScalingIsNotTheReasonWhereTheWindowOfTheGainIsWhole) {
   GivenUnit unit;
   unit.add(10, kError);
   unit.rules.guards.iterations_full_at = 20;
-  EXPECT_EQ(unit.request().iterations, 12) << "23 * 10 / 20 = 11.5";
+  EXPECT_EQ(unit.request().schedule.iterations, 12) << "23 * 10 / 20 = 11.5";
   unit.refine(0, {0.25, 0.245});
   EXPECT_EQ(unit.judge().reason, Reason::gain_too_small);
   unit.work.refined->front().curve = {0.25, 0.15};
@@ -124,8 +124,8 @@ TEST(GuardedJudging, HeldOutKeypointsChooseTheIterate) {
   unit.rules.guards.held_out_share = 0.2;
   unit.rules.guards.held_out_patience = 4;
   const device::AdaptRequest request = unit.request();
-  EXPECT_EQ(std::count(request.held_out.begin(), request.held_out.end(), true), 2);
-  EXPECT_EQ(request.patience, 4);
+  EXPECT_EQ(std::count(request.schedule.held_out.begin(), request.schedule.held_out.end(), true), 2);
+  EXPECT_EQ(request.schedule.patience, 4);
   EXPECT_EQ(request.keypoints, crop_keypoints(unit.candidates[0].record)) << "their weights stay";
   unit.refine(0, {0.25, 0.21, 0.205}, {0.3, 0.2, 0.25});
   EXPECT_EQ(unit.judge().best_iteration, 1);
@@ -137,11 +137,29 @@ TEST(GuardedJudging, OneKeypointCannotBeHeldOut) {
   GivenUnit unit;
   unit.add(1, kError);
   unit.rules.guards.held_out_share = 0.2;
-  EXPECT_EQ(unit.request().iterations, 0);
+  EXPECT_EQ(unit.request().schedule.iterations, 0);
   unit.refine(0, {0.25});
   EXPECT_EQ(unit.judge().verdict, Verdict::discarded);
   EXPECT_EQ(unit.judge().reason, Reason::held_out_not_better);
   EXPECT_EQ(unit.judge().initial_error, 0.25);
+}
+
+TEST(GuardedJudging, RetainedPredictionsAreAdaptedOnRequest) {
+  GivenUnit unit;
+  unit.add(10, 0.125F);
+  unit.add(1, 0.125F);
+  for (auto& [name, limits] : unit.rules.thresholds) limits.refine_retained = true;
+  EXPECT_EQ(unit.judge().verdict, Verdict::retained) << "not adapted yet";
+  unit.refine(0, {0.125, 0.12});
+  EXPECT_EQ(unit.judge().verdict, Verdict::refined);
+  unit.work.refined->front().curve = {0.125, 0.2};
+  EXPECT_EQ(unit.judge().verdict, Verdict::retained);
+  // With held-out keypoints, they choose the iterate; a sample that can hold out none stays as predicted.
+  unit.rules.guards.held_out_share = 0.2;
+  unit.work.refined->front() = {0, {0.125, 0.12}, {}, {0.3, 0.35}};
+  EXPECT_EQ(unit.judge().verdict, Verdict::retained);
+  unit.refine(1, {0.125});
+  EXPECT_EQ(unit.judge(1).verdict, Verdict::retained);
 }
 
 }  // namespace

@@ -110,6 +110,15 @@ TEST(PictureNeeds, TheBandDecidesUntilThereIsAVerdict) {
   EXPECT_EQ(middle.facts().standing, Standing::may_be_kept);
 }
 
+TEST(PictureNeeds, ARetainedPredictionIsAdaptedOnRequest) {
+  OneCandidate low(0.1F);
+  low.rules.thresholds["d"].refine_retained = true;
+  EXPECT_EQ(low.facts().standing, Standing::to_adapt);
+  OneCandidate high(0.5F);
+  high.rules.thresholds["d"].refine_retained = true;
+  EXPECT_EQ(high.facts().standing, Standing::finished);
+}
+
 TEST(PictureNeeds, ARunWithoutRulesNeedsPatchesOnly) {
   OneCandidate one(0.3F);
   EXPECT_EQ(picture_facts(one.work, 0, nullptr).standing, Standing::finished);

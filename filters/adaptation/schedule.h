@@ -1,0 +1,39 @@
+// How one sample is adapted and when its adaptation ends. The fidelity rule makes a schedule
+// (filters/fidelity.h), the network's adaptation follows it (model/tta.h); neither knows the other.
+#pragma once
+
+#include <array>
+#include <span>
+
+#include "smal/sizes.h"
+
+namespace q3d::filters::adaptation {
+
+// All fields are of one sample, so that its result does not depend on the other samples of its batch.
+struct Schedule {
+  int iterations = 10;
+  double stop_below = 0.0;  // crop units; adaptation ends as soon as L_proj is below it; 0 = never
+  double min_gain = 0.0;    // it ends after gain_window iterations with a smaller relative gain; 0 = never
+  int gain_window = 10;
+  // Visible keypoints that the objective does not see. The others must not all be among them. If there are
+  // any, the best iterate is the one of least error on them.
+  std::array<bool, smal::kNumKeypoints> held_out{};
+  int patience = 0;  // it ends after so many iterations without a new least held-out error; 0 = never
+};
+
+// Returns whether any keypoint is held out.
+bool holds_out(const Schedule& schedule);
+
+// Throws std::invalid_argument that names the field unless iterations >= 0, gain_window >= 1 and
+// patience >= 0.
+void check(const Schedule& schedule);
+
+// Returns (L0 - least of iterates 1..window) / L0, over the finite ones of these iterates. `curve` holds
+// L_proj of the iterates 0..n, of which L0 is the first. It is 0 for L0 = 0, and NaN if none of these
+// iterates is there and finite. Throws std::invalid_argument for an empty curve.
+double relative_gain(std::span<const double> curve, int window);
+
+// Returns whether adaptation ends at the last iterate of `curve`. `best`: the best iterate so far.
+bool is_finished(const Schedule& schedule, std::span<const double> curve, int best);
+
+}  // namespace q3d::filters::adaptation
