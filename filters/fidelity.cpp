@@ -86,7 +86,11 @@ Judgement judge_iterate(std::span<const double> curve, std::size_t kept, const T
 
 void check(const Thresholds& t) {
   require(t.tau_low > 0, "0 < tau_low", t.tau_low);
-  require(t.tau_low <= t.tau_high, "tau_low <= tau_high", t.tau_high);
+  if (!(t.tau_low <= t.tau_high)) {
+    throw std::invalid_argument(
+        fmt::format("thresholds: tau_low <= tau_high must hold, got tau_low {} and tau_high {}{}", t.tau_low,
+                    t.tau_high, t.tau_low > t.tau_high ? ", which seem to be exchanged" : ""));
+  }
   require(t.delta >= 0 && t.delta < 1, "0 <= delta < 1", t.delta);
   require(t.gain_window >= 1, "gain_window >= 1", t.gain_window);
   require(t.iterations_min >= 1, "iterations_min >= 1", t.iterations_min);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <stdexcept>
 #include <utility>
@@ -31,9 +32,10 @@ bool CsvReader::next(CsvRow& cells) {
   line_ = next_line_;
   do {
     cells.push_back(cell());
-  } while (take(','));
+  } while (take(separator_));
   if (at_ < text_.size() && !take_line_end()) {
-    fail("text after a closing quote, or a lone CR", "a comma or the line's end");
+    fail("text after a closing quote, or a lone CR",
+         separator_ == ',' ? "a comma or the line's end" : "a separator or the line's end");
   }
   next_line_ += static_cast<std::size_t>(std::count(text_.begin() + static_cast<std::ptrdiff_t>(start),
                                                     text_.begin() + static_cast<std::ptrdiff_t>(at_), '\n'));
@@ -60,7 +62,9 @@ bool CsvReader::take_line_end() {
 
 std::string CsvReader::cell() {
   if (!take('"')) {
-    const std::size_t end = std::min(text_.find_first_of(",\r\n", at_), text_.size());
+    const std::array<char, 3> ends{separator_, '\r', '\n'};
+    const std::size_t end =
+        std::min(text_.find_first_of(std::string_view(ends.data(), ends.size()), at_), text_.size());
     const std::size_t start = std::exchange(at_, end);
     return std::string(text_.substr(start, end - start));
   }

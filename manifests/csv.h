@@ -22,8 +22,10 @@ std::string csv_line(const CsvRow& cells);
 // Reads the cells of one line after the other. Lines end in LF or CRLF; empty lines are skipped.
 class CsvReader {
  public:
-  // `where` names the file in messages. The text must outlive the reader.
-  CsvReader(std::string_view text, std::string where) : text_(text), where_(std::move(where)) {}
+  // `where` names the file in messages. The text must outlive the reader. Spreadsheets of some countries
+  // separate cells by semicolons, and others by tabs.
+  CsvReader(std::string_view text, std::string where, char separator = ',')
+      : text_(text), where_(std::move(where)), separator_(separator) {}
 
   // Reads the next line. Returns false at the end of the text. Throws like fail() if a quote is not closed or
   // if text follows a closing quote.
@@ -40,6 +42,7 @@ class CsvReader {
 
   std::string_view text_;
   std::string where_;
+  char separator_;
   std::size_t at_ = 0;
   std::size_t line_ = 0;       // where the cells that were read last begin, from 1
   std::size_t next_line_ = 1;  // where the next cells begin

@@ -5,34 +5,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <span>
 #include <stdexcept>
 #include <string_view>
 
-#include "manifests/file_descriptor.h"
+#include "manifests/text_file.h"
 
 namespace q3d::manifests {
 namespace {
-
-constexpr std::uintmax_t kMaxAnnotationBytes = std::uintmax_t{4} << 30U;
-
-std::string read_text(const std::filesystem::path& path) {
-  try {
-    const FileDescriptor file = open_input(path);
-    const std::uint64_t size = file.size();
-    if (size > kMaxAnnotationBytes) {
-      throw std::runtime_error(fmt::format("{}: got {} bytes, expected an annotation file of at most {}",
-                                           path.string(), size, kMaxAnnotationBytes));
-    }
-    std::string text(size, '\0');
-    file.read_at(0, std::as_writable_bytes(std::span(text)));
-    return text;
-  } catch (const IoError& error) {
-    if (!error.names_no_file()) throw;
-    throw std::runtime_error(
-        fmt::format("{}: {}, expected an annotation file", path.string(), error.reason()));
-  }
-}
 
 bool is_token_char(char c) {
   return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '-' || c == '+' ||
@@ -71,14 +50,21 @@ void mask_numbers_beyond_json(std::string& text) {
   }
 }
 
+// Says what the text is that JSON's parser gave up on, if it is known; else "".
+std::string hint(std::string_view text, std::string_view reason) {
+  if (reason.find("UTF-8") != std::string_view::npos) return " (save the file with the encoding UTF-8)";
+  const std::string_view line = text.substr(0, text.find_first_of("\r\n"));
+  const bool is_numbers = line.find_first_not_of("0123456789.-+eE \t") == std::string_view::npos;
+  if (is_numbers && std::count(line.begin(), line.end(), ' ') >= 4) {
+    return " (these are lines of numbers, as YOLO writes them: export the labels as COCO Keypoints instead)";
+  }
+  return {};
+}
+
 }  // namespace
 
 nlohmann::json read_json_file(const std::filesystem::path& file) {
-  std::string text = read_text(file);
-  if (text.starts_with("version https://git-lfs")) {
-    throw std::runtime_error(
-        fmt::format("{}: got a Git-LFS pointer, expected JSON: run `git lfs pull`", file.string()));
-  }
+  std::string text = read_text_file(file, "an annotation file in JSON");
   mask_numbers_beyond_json(text);
   try {
     return nlohmann::json::parse(text);
@@ -92,9 +78,9 @@ nlohmann::json read_json_file(const std::filesystem::path& file) {
     // It also repeats what was read last, which may be the rest of the file.
     constexpr std::size_t kLongest = 300;
     if (reason.size() > kLongest) reason.replace(kLongest / 2, reason.size() - kLongest, " ... ");
-    throw std::runtime_error(fmt::format("{}: line {}, byte {} of {}: {}{}", file.string(), line, error.byte,
-                                         text.size(), reason,
-                                         at >= text.size() ? " (the file seems to be cut short)" : ""));
+    throw std::runtime_error(fmt::format(
+        "{}: line {}, byte {} of {}: {}{}{}", file.string(), line, error.byte, text.size(), reason,
+        at >= text.size() ? " (the file seems to be cut short)" : "", hint(text, reason)));
   }
 }
 

@@ -65,6 +65,10 @@ std::string record_digest(const SampleRecord& record) {
     out.reals(record.truth->keypoints_3d);
   }
   out.text(to_string(record.failure));
+  if (record.orientation != 1 || record.scale != 1.0) {
+    out.integer(record.orientation);
+    out.real(record.scale);
+  }
   return out.digest();
 }
 

@@ -113,6 +113,8 @@ void to_json(json& object, const SampleRecord& record) {
             {"keypoints", keypoints_json(record.keypoints)},
             {"failure", to_string(record.failure)},
             {"failure_detail", record.failure_detail}};
+  if (record.orientation != 1) object["orientation"] = record.orientation;
+  if (record.scale != 1.0) object["scale"] = number(record.scale);
   if (record.truth) object["truth"] = truth_json(*record.truth);
 }
 
@@ -139,6 +141,8 @@ void from_json(const json& object, SampleRecord& record) {
     read.keypoints = read_keypoints(at("keypoints"));
     read.failure = reason_from_string(at("failure").get_ref<const std::string&>());
     at("failure_detail").get_to(read.failure_detail);
+    if (object.contains("orientation")) at("orientation").get_to(read.orientation);
+    if (object.contains("scale")) read.scale = number(at("scale"));
     if (object.contains("truth")) read.truth = read_truth(at("truth"));
   } catch (const std::exception& error) {
     throw std::runtime_error(

@@ -11,20 +11,24 @@ constexpr std::array<std::string_view, 6> kFamilyNames{"none",    "felidae", "ca
                                                        "equidae", "bovidae", "hippopotamidae"};
 static_assert(kFamilyNames.size() == static_cast<std::size_t>(Family::hippopotamidae) + 2);
 
-constexpr std::array<std::string_view, 32> kReasonNames{
+constexpr std::array<std::string_view, 37> kReasonNames{
     "none",
     "box_missing",
     "box_not_finite",
     "box_zero_size",
     "box_outside_image",
+    "box_too_small",
     "keypoints_missing",
     "keypoints_wrong_length",
     "keypoints_not_finite",
     "no_visible_keypoints",
+    "keypoints_outside",
+    "not_in_pixels",
     "record_malformed",
     "image_not_listed",
     "pose_missing",
     "not_a_quadruped",
+    "duplicate",
     "image_missing",
     "image_empty",
     "image_is_lfs_pointer",
@@ -32,6 +36,7 @@ constexpr std::array<std::string_view, 32> kReasonNames{
     "image_truncated",
     "image_too_large",
     "path_escapes_root",
+    "size_mismatch",
     "prediction_not_finite",
     "error_too_large",
     "gain_too_small",

@@ -18,10 +18,10 @@ using smal::kNumBetas;
 using smal::kNumJoints;
 using smal::kNumKeypoints;  // of Animal3D: those of SMAL
 
-// One annotated keypoint, in pixels of the source image as stored (EXIF orientation is never applied), with
-// the origin at the top left. `v` is the file's own value, unchanged (-1, 0, 1, 2, or a likelihood). `weight`
-// is what the toolkit uses: 0 if the keypoint is not labelled, else 1 or the likelihood. A keypoint is
-// visible if its weight is greater than 0.
+// One annotated keypoint, in pixels of the source image, with the origin at the top left. The image is as
+// stored, unless the record's `orientation` turns it. `v` is the file's own value, unchanged (-1, 0, 1, 2, or
+// a likelihood). `weight` is what the toolkit uses: 0 if the keypoint is not labelled, else 1 or the
+// likelihood. A keypoint is visible if its weight is greater than 0.
 struct Keypoint {
   double x_px = 0.0;
   double y_px = 0.0;
@@ -62,14 +62,18 @@ enum class Reason : std::uint8_t {
   box_not_finite,
   box_zero_size,
   box_outside_image,
+  box_too_small,  // a few pixels
   keypoints_missing,
   keypoints_wrong_length,
   keypoints_not_finite,
   no_visible_keypoints,
+  keypoints_outside,  // most labelled keypoints lie outside the picture or outside their box
+  not_in_pixels,      // keypoints or box are fractions between 0 and 1
   record_malformed,
   image_not_listed,
   pose_missing,     // the label must come from the file's body, but the record has none
   not_a_quadruped,  // left out by the species rule (birds, primates, ...)
+  duplicate,        // an earlier record has the same picture and the same keypoints
   // failed while reading the picture
   image_missing,
   image_empty,
@@ -78,6 +82,7 @@ enum class Reason : std::uint8_t {
   image_truncated,
   image_too_large,
   path_escapes_root,
+  size_mismatch,  // the picture has another size than the annotation file says
   // failed in the network
   prediction_not_finite,
   // discarded by the fidelity rule
@@ -108,8 +113,10 @@ struct SampleRecord {
   std::string image_path;  // absolute, resolved; empty when it could not be resolved
   std::string image_ref;   // as the annotation file names it
   std::string mask_path;   // absolute; empty when there is none
-  int width_px = 0;        // as the annotation says; 0 when it does not
+  int width_px = 0;        // as the annotation says, or as its labels were scaled; 0 when it does not
   int height_px = 0;
+  int orientation = 1;  // EXIF's, by which the stored pixels are turned before anything else; 1 does not turn
+  double scale = 1.0;   // by which box and keypoints were multiplied because the picture had been resized
   Box box;
   Keypoints keypoints;
   std::optional<BodyTruth> truth;

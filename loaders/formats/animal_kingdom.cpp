@@ -70,11 +70,13 @@ std::vector<manifests::Keypoint> read_mpii_keypoints(RecordReader& reader) {
 SampleRecord read_mpii_record(const nlohmann::json& record, std::size_t index, Loading& loading) {
   SampleRecord sample;
   RecordReader reader(record, fmt::format("{}: record [{}]", loading.file.string(), index), sample);
-  set_picture(loading, reader, reader.text("image"), "image", std::to_string(index), sample);
+  set_picture(loading, reader, {{reader.text("image"), "image"}}, std::to_string(index), sample);
   add_animal(loading, reader, sample);
   sample.box = read_mpii_box(reader);
   check_box(reader, "center, scale", sample);
-  sample.keypoints = keypoints::to_animal3d(kingdom(), read_mpii_keypoints(reader));
+  const std::vector<manifests::Keypoint> points = read_mpii_keypoints(reader);
+  note_placeholders(loading, points, sample);
+  sample.keypoints = keypoints::to_animal3d(kingdom(), points);
   check_visible(reader, "joints_vis", sample);
   return sample;
 }
@@ -84,7 +86,12 @@ SampleRecord read_mpii_record(const nlohmann::json& record, std::size_t index, L
 Dataset load_animal_kingdom(const DatasetOptions& options) {
   Loading loading(options, "dataset");
   const nlohmann::json document = manifests::read_json_file(loading.file);
-  if (!document.is_array()) return load_coco(document, kingdom(), loading, {.add = add_animal});
+  if (!document.is_array()) {
+    const auto add = [](Loading& here, RecordReader& annotation, const CocoCategory&, SampleRecord& sample) {
+      add_animal(here, annotation, sample);
+    };
+    return load_coco(document, kingdom(), loading, {.add = add});
+  }
   std::vector<SampleRecord> records;
   records.reserve(document.size());
   for (std::size_t i = 0; i < document.size(); ++i) {

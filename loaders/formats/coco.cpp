@@ -3,14 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
+#include <array>
 #include <limits>
-#include <numeric>
 #include <stdexcept>
-#include <unordered_map>
 #include <unordered_set>
 #include <utility>
 
+#include "loaders/formats/other_tools.h"
 #include "loaders/pictures/box.h"
 #include "manifests/json_file.h"
 
@@ -19,186 +18,180 @@ namespace {
 
 using manifests::Reason;
 using manifests::SampleRecord;
-
-std::optional<std::int64_t> id_in(const nlohmann::json& object, const char* key) {
-  if (!object.is_object()) return std::nullopt;
-  const auto found = object.find(key);
-  if (found == object.end() || !found->is_number_integer()) return std::nullopt;
-  return found->get<std::int64_t>();
-}
-
-std::vector<std::string> names_in(const nlohmann::json& category) {
-  std::vector<std::string> names;
-  for (const auto& name : category["keypoints"]) {
-    names.push_back(name.is_string() ? name.get<std::string>() : manifests::describe(name));
-  }
-  return names;
-}
-
-// Returns the keypoint names that the categories list; empty if none lists any.
-std::vector<std::string> keypoint_names(const nlohmann::json& document, const Loading& loading) {
-  std::vector<std::string> names;
-  const auto categories = document.find("categories");
-  if (categories == document.end() || !categories->is_array()) return names;
-  for (std::size_t i = 0; i < categories->size(); ++i) {
-    const nlohmann::json& category = (*categories)[i];
-    const bool lists_any = category.is_object() && category.contains("keypoints") &&
-                           category["keypoints"].is_array() && !category["keypoints"].empty();
-    if (!lists_any) continue;
-    std::vector<std::string> here = names_in(category);
-    if (!names.empty() && here != names) {
-      throw std::runtime_error(fmt::format(
-          "{}: categories[{}]: keypoints: got names that differ from those of an earlier category, "
-          "expected the same list of keypoints in all categories of a file",
-          loading.file.string(), i));
-    }
-    names = std::move(here);
-  }
-  return names;
-}
-
-std::vector<int> order_of(const nlohmann::json& document, const keypoints::Topology& topology,
-                          Loading& loading) {
-  std::vector<int> in_order(topology.keypoints.size());
-  std::iota(in_order.begin(), in_order.end(), 0);
-  const std::vector<std::string> names = keypoint_names(document, loading);
-  if (names.empty()) {
-    loading.notes.add(fmt::format(
-        "no category lists the names of its keypoints; they are read in the order of the topology {}",
-        topology.name));
-    return in_order;
-  }
-  try {
-    std::vector<int> order = keypoints::order_in_file(topology, names);
-    if (order != in_order) {
-      loading.notes.add(fmt::format(
-          "the file's keypoints are not in the order of the topology {}; they are matched by name",
-          topology.name));
-    }
-    return order;
-  } catch (const std::invalid_argument& error) {
-    throw std::runtime_error(
-        fmt::format("{}: categories: keypoints: {}", loading.file.string(), error.what()));
-  }
-}
+using nlohmann::json;
 
 struct CocoFile {
-  const nlohmann::json& annotations;
+  const json& annotations;
   const keypoints::Topology& topology;
-  std::vector<int> order;  // place in the file of each keypoint of the topology
-  std::unordered_map<std::int64_t, const nlohmann::json*> image_of_id;  // an object, or a file name alone
-  bool ids_are_distinct = false;                                        // of the annotations
+  CocoCategories categories;
+  CocoIdMap<const json*> images{};  // an object, or a file name alone
+  bool ids_are_distinct = false;    // of the annotations
 };
 
 // Indexes the images by id. If several have the same id, the first is used. Returns how many repeat an id.
-std::size_t index_images(const nlohmann::json& images, CocoFile& file) {
+std::size_t index_images(const json& images, CocoFile& file) {
   std::size_t repeated = 0;
   for (const auto& [key, image] : images.items()) {
-    std::optional<std::int64_t> id = id_in(image, "id");
-    if (images.is_object()) {
-      std::int64_t number = 0;
-      const auto [end, error] = std::from_chars(key.data(), key.data() + key.size(), number);
-      id = error == std::errc() && end == key.data() + key.size() ? std::optional(number) : std::nullopt;
-    }
-    if (id && !file.image_of_id.emplace(*id, &image).second) ++repeated;
+    const std::optional<CocoId> id = images.is_object() ? coco_id_of_key(key) : coco_id(image, "id");
+    if (id && !file.images.add(*id, &image)) ++repeated;
   }
   return repeated;
 }
 
-const nlohmann::json& images_of(const nlohmann::json& document, const Loading& loading) {
+const json& images_of(const json& document, const Loading& loading) {
   const bool is_map = document.is_object() && document.contains("images") && document["images"].is_object();
   return is_map ? document["images"] : manifests::array_of(document, "images", loading.file);
 }
 
-CocoFile index_file(const nlohmann::json& document, const keypoints::Topology& topology, Loading& loading) {
-  const nlohmann::json& images = images_of(document, loading);
+// Returns the last part of a sample's id. Ids that are texts may hold anything.
+std::string annotation_part(const CocoFile& file, std::size_t index) {
+  if (!file.ids_are_distinct) return std::to_string(index);
+  return id_part(coco_id(file.annotations[index], "id")->text);
+}
+
+void index_annotations(CocoFile& file, Loading& loading) {
+  std::unordered_set<std::string> ids;
+  std::unordered_set<const json*> used_images;
+  for (const json& annotation : file.annotations) {
+    if (const auto id = coco_id(annotation, "id")) ids.insert(id_part(id->text));
+    const auto image = coco_id(annotation, "image_id");
+    if (const json* const* found = image ? file.images.find(*image) : nullptr) used_images.insert(*found);
+  }
+  file.ids_are_distinct = ids.size() == file.annotations.size();
+  if (file.images.found_as_other_type() > 0) {
+    loading.notes.add(fmt::format("image ids are texts in one place of the file and numbers in another; they "
+                                  "are taken for the same if the numbers are equal: {} annotations",
+                                  file.images.found_as_other_type()),
+                      NoteKind::caution);
+  }
+  if (used_images.size() < file.images.size()) {
+    loading.notes.add(
+        fmt::format("images without an annotation: {}", file.images.size() - used_images.size()));
+  }
+}
+
+CocoFile index_file(const json& document, const keypoints::Topology& topology, Loading& loading) {
+  if (const std::string tool = known_tool(document); !tool.empty()) {
+    throw std::runtime_error(fmt::format("{}: got {}", loading.file.string(), tool));
+  }
+  const json& images = images_of(document, loading);
   CocoFile file{.annotations = manifests::array_of(document, "annotations", loading.file),
                 .topology = topology,
-                .order = order_of(document, topology, loading),
-                .image_of_id = {}};
+                .categories = CocoCategories(document, topology, loading)};
   if (const std::size_t repeated = index_images(images, file); repeated > 0) {
     loading.notes.add(fmt::format(
         "images that repeat the id of an earlier image (the first image of an id is used): {}", repeated));
   }
-  std::unordered_set<std::int64_t> ids;
-  std::unordered_set<std::int64_t> used_images;
-  for (const nlohmann::json& annotation : file.annotations) {
-    if (const auto id = id_in(annotation, "id")) ids.insert(*id);
-    if (const auto image = id_in(annotation, "image_id")) used_images.insert(*image);
-  }
-  file.ids_are_distinct = ids.size() == file.annotations.size();
-  const auto unused = std::count_if(file.image_of_id.begin(), file.image_of_id.end(),
-                                    [&](const auto& image) { return !used_images.contains(image.first); });
-  if (unused > 0) loading.notes.add(fmt::format("images without an annotation: {}", unused));
+  index_annotations(file, loading);
   return file;
 }
 
+// Returns the fields of an image that name its picture. coco-annotator writes `path`, and COCO's own files a
+// URL that ends in the file's name.
+std::vector<PictureName> picture_names(const json& listed, RecordReader& image) {
+  std::vector<PictureName> names;
+  for (const char* field : {"file_name", "path", "coco_url"}) {
+    const auto name = listed.find(field);
+    if (name == listed.end() || !name->is_string() || name->get_ref<const std::string&>().empty()) continue;
+    names.push_back({name->get<std::string>(), field});
+  }
+  if (names.empty()) names.push_back({image.text("file_name"), "file_name"});
+  return names;
+}
+
 // Reads picture, size and sub-dataset from the image that the annotation points to.
-void read_image(const CocoFile& file, std::size_t index, Loading& loading, RecordReader& annotation,
+void read_image(CocoFile& file, std::size_t index, Loading& loading, RecordReader& annotation,
                 SampleRecord& sample) {
-  const std::string name = std::to_string(file.ids_are_distinct ? *id_in(file.annotations[index], "id")
-                                                                : static_cast<std::int64_t>(index));
-  const auto id = annotation.integer("image_id");
-  const auto found = id ? file.image_of_id.find(*id) : file.image_of_id.end();
-  if (found == file.image_of_id.end()) {
-    annotation.fail(Reason::image_not_listed, "image_id", id ? std::to_string(*id) : "nothing",
-                    "an id of `images`");
-    set_picture(loading, annotation, "", "image_id", name, sample);
+  const std::string part = annotation_part(file, index);
+  const json& record = file.annotations[index];
+  const auto id = coco_id(record, "image_id");
+  const json* const* found = id ? file.images.find(*id) : nullptr;
+  if (found == nullptr) {
+    const bool has_field = annotation.has("image_id");
+    const bool is_no_id = has_field && !id;
+    annotation.fail(is_no_id ? Reason::record_malformed : Reason::image_not_listed, "image_id",
+                    has_field ? manifests::describe(record["image_id"]) : "nothing",
+                    is_no_id                        ? "a whole number or a text"
+                    : file.images.example().empty() ? "an id of `images`"
+                                                    : "an id of `images`, such as " + file.images.example());
+    set_picture(loading, annotation, {{"", "image_id"}}, part, sample);
     return;
   }
-  if (found->second->is_string()) {
-    set_picture(loading, annotation, found->second->get<std::string>(), "image_id", name, sample);
+  const json& listed = **found;
+  if (listed.is_string()) {
+    set_picture(loading, annotation, {{listed.get<std::string>(), "image_id"}}, part, sample);
     return;
   }
-  RecordReader image(*found->second, fmt::format("{}: the image of id {}", loading.file.string(), *id),
-                     sample);
-  set_picture(loading, image, image.text("file_name"), "file_name", name, sample);
+  RecordReader image(listed, fmt::format("{}: the image of id {}", loading.file.string(), id->key()), sample);
+  set_picture(loading, image, picture_names(listed, image), part, sample);
   sample.width_px = image.size_px("width");
   sample.height_px = image.size_px("height");
   sample.source = image.optional_text("source_dataset");
 }
 
+// Whether `bbox` says anything. Tools write zeros, null or an empty list where nobody drew a box.
+bool has_box(const json& annotation) {
+  const auto box = annotation.is_object() ? annotation.find("bbox") : annotation.end();
+  if (box == annotation.end() || box->is_null()) return false;
+  if (!box->is_array()) return true;
+  const auto is_nothing = [](const json& value) {
+    return value.is_null() || (value.is_number() && value.get<double>() == 0.0);
+  };
+  return !std::all_of(box->begin(), box->end(), is_nothing) &&
+         !(box->size() == 4 && is_nothing((*box)[2]) && is_nothing((*box)[3]));
+}
+
 // Reads an annotation. If it has no box and the rules allow it, returns a box around the keypoints;
 // sample.box is then NaN.
-std::optional<manifests::Box> read_annotation(const CocoFile& file, std::size_t index, Loading& loading,
+std::optional<manifests::Box> read_annotation(CocoFile& file, std::size_t index, Loading& loading,
                                               RecordReader& annotation, const CocoRules& rules,
                                               SampleRecord& sample) {
   read_image(file, index, loading, annotation, sample);
-  const bool makes_box = rules.box_margin && !annotation.has("bbox");
+  const json& record = file.annotations[index];
+  const bool makes_box = rules.box_margin && !has_box(record);
   if (!makes_box) sample.box = annotation.box("bbox");  // the four numbers as they stand
-  const std::vector<manifests::Keypoint> in_file = annotation.keypoints("keypoints", file.order.size());
-  std::vector<manifests::Keypoint> points(file.order.size());
-  std::transform(file.order.begin(), file.order.end(), points.begin(),
-                 [&](int place) { return in_file[static_cast<std::size_t>(place)]; });
+  const CocoCategory* category = file.categories.of(record);
+  if (category == nullptr) {
+    annotation.fail(Reason::record_malformed, "category_id",
+                    annotation.has("category_id") ? manifests::describe(record["category_id"]) : "nothing",
+                    "the id of a category that lists keypoints");
+    return std::nullopt;
+  }
+  const std::vector<manifests::Keypoint> in_file =
+      annotation.keypoints("keypoints", category->keypoints.size());
+  note_placeholders(loading, in_file, sample);
+  std::vector<manifests::Keypoint> points = keypoints::in_topology_order(category->match, in_file);
   if (rules.weigh) rules.weigh(points);
   sample.keypoints = keypoints::to_animal3d(file.topology, points);
-  rules.add(loading, annotation, sample);
+  rules.add(loading, annotation, *category, sample);
   check_visible(annotation, "keypoints", sample);
   if (!makes_box || annotation.failed()) return std::nullopt;
   sample.box.x_px = std::numeric_limits<double>::quiet_NaN();
   return pictures::box_around(points, *rules.box_margin);
 }
 
-}  // namespace
-
-Dataset load_coco(const nlohmann::json& document, const keypoints::Topology& topology, Loading& loading,
-                  const CocoRules& rules) {
-  const CocoFile file = index_file(document, topology, loading);
-  std::vector<SampleRecord> records(file.annotations.size());
-  std::vector<std::optional<manifests::Box>> made_boxes(records.size());
-  const auto reader_of = [&](std::size_t index) {
-    return RecordReader(file.annotations[index],
-                        fmt::format("{}: annotations[{}]", loading.file.string(), index), records[index]);
-  };
-  for (std::size_t i = 0; i < records.size(); ++i) {
-    RecordReader reader = reader_of(i);
-    made_boxes[i] = read_annotation(file, i, loading, reader, rules, records[i]);
+// The annotations that become records, by their places in the file.
+std::vector<std::size_t> chosen_annotations(CocoFile& file) {
+  std::vector<std::size_t> chosen;
+  for (std::size_t i = 0; i < file.annotations.size(); ++i) {
+    if (!file.categories.leaves_out(file.annotations[i])) chosen.push_back(i);
   }
+  return chosen;
+}
+
+// Sets the boxes that were made, reads the others as the vote says, and checks all of them.
+template <typename ReaderOf>
+void settle_boxes(Loading& loading, const CocoRules& rules,
+                  const std::vector<std::optional<manifests::Box>>& made_boxes, ReaderOf reader_of,
+                  std::vector<SampleRecord>& records) {
   const pictures::BoxVote vote = pictures::vote_on_boxes(records);
   if (vote.corners > 0) {
-    loading.notes.add(fmt::format(
-        "boxes: {} records fit only as x1, y1, x2, y2 and {} only as x, y, width, height; all are read as {}",
-        vote.corners, vote.extents, vote.is_corners() ? "x1, y1, x2, y2" : "x, y, width, height"));
+    loading.notes.add(
+        fmt::format(
+            "boxes: {} records fit only as x1, y1, x2, y2 and {} only as x, y, width, height; all are "
+            "read as {}",
+            vote.corners, vote.extents, vote.is_corners() ? "x1, y1, x2, y2" : "x, y, width, height"),
+        NoteKind::caution);
   }
   for (std::size_t i = 0; i < records.size(); ++i) {
     if (made_boxes[i]) {
@@ -213,6 +206,26 @@ Dataset load_coco(const nlohmann::json& document, const keypoints::Topology& top
     RecordReader reader = reader_of(i);
     check_box(reader, "bbox", records[i]);
   }
+}
+
+}  // namespace
+
+Dataset load_coco(const json& document, const keypoints::Topology& topology, Loading& loading,
+                  const CocoRules& rules) {
+  CocoFile file = index_file(document, topology, loading);
+  const std::vector<std::size_t> places = chosen_annotations(file);
+  std::vector<SampleRecord> records(places.size());
+  std::vector<std::optional<manifests::Box>> made_boxes(records.size());
+  const auto reader_of = [&](std::size_t i) {
+    return RecordReader(file.annotations[places[i]],
+                        fmt::format("{}: annotations[{}]", loading.file.string(), places[i]), records[i]);
+  };
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    RecordReader reader = reader_of(i);
+    made_boxes[i] = read_annotation(file, places[i], loading, reader, rules, records[i]);
+  }
+  settle_boxes(loading, rules, made_boxes, reader_of, records);
+  file.categories.add_notes(loading);
   return finished(loading, std::move(records));
 }
 

@@ -7,14 +7,15 @@
 #include <optional>
 #include <span>
 
+#include "loaders/formats/coco_categories.h"
 #include "loaders/formats/formats.h"
 #include "loaders/keypoints/topology.h"
 
 namespace q3d::loaders::formats {
 
 // Reads what a format adds to a sample after its picture, box and 26 keypoints have been read.
-using CocoAddition =
-    std::function<void(Loading& loading, RecordReader& annotation, manifests::SampleRecord& sample)>;
+using CocoAddition = std::function<void(Loading& loading, RecordReader& annotation,
+                                        const CocoCategory& category, manifests::SampleRecord& sample)>;
 
 struct CocoRules {
   CocoAddition add;
@@ -25,10 +26,10 @@ struct CocoRules {
   std::optional<double> box_margin{};
 };
 
-// Loads all annotations in file order. Keypoints are found by the names that the categories list, in any
-// order. Boxes are read as the majority of the file indicates (vote_on_boxes) and then checked. `images` is
-// COCO's list, or an object from id to file name. Throws std::runtime_error if images or annotations are
-// missing, if two categories list different keypoints, or if their names are not those of the topology.
+// Loads all annotations of the chosen categories in file order. Keypoints are found by the names that the
+// categories list, in any order; what is missing gets weight 0. Boxes are read as the majority of the file
+// indicates (vote_on_boxes) and then checked. `images` is COCO's list, or an object from id to file name.
+// Throws as CocoCategories does, and std::runtime_error if images or annotations are missing.
 Dataset load_coco(const nlohmann::json& document, const keypoints::Topology& topology, Loading& loading,
                   const CocoRules& rules);
 

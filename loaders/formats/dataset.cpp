@@ -57,21 +57,48 @@ Dataset load_dataset(const DatasetOptions& options) {
 Loading::Loading(const DatasetOptions& dataset_options, const std::filesystem::path& default_images)
     : options(dataset_options),
       file(dataset_options.root / dataset_options.annotations),
-      finder(dataset_options.root, dataset_options.images, default_images) {}
+      finder({.root = dataset_options.root,
+              .images = dataset_options.images,
+              .default_images = default_images,
+              .annotations = dataset_options.annotations.parent_path()}) {}
 
-void set_picture(Loading& loading, RecordReader& reader, const std::string& name, const std::string& field,
-                 const std::string& annotation, SampleRecord& sample) {
+void set_found_picture(Loading& loading, RecordReader& reader, const PictureName& name, FoundPicture found,
+                       const std::string& annotation, SampleRecord& sample) {
   sample.dataset = loading.options.name;
   sample.split = loading.options.split;
-  sample.image_ref = name;
-  sample.id = fmt::format("{}/{}/{}#{}", sample.dataset, sample.split, id_part(name), annotation);
+  sample.image_ref = name.name;
+  sample.id = fmt::format("{}/{}/{}#{}", sample.dataset, sample.split, id_part(name.name), annotation);
   if (reader.failed()) return;
-  FoundPicture found = loading.finder.find(name);
   if (found.failure == Reason::none) {
     sample.image_path = found.path.string();
   } else {
-    reader.fail(found.failure, field, found.got, "a picture below the dataset's root");
+    reader.fail(found.failure, name.field, found.got, "a picture below the dataset's root");
   }
+}
+
+void set_picture(Loading& loading, RecordReader& reader, const std::vector<PictureName>& names,
+                 const std::string& annotation, SampleRecord& sample) {
+  FoundPicture first;
+  for (std::size_t i = 0; i < names.size() && !reader.failed(); ++i) {
+    FoundPicture found = loading.finder.find(names[i].name);
+    if (found.failure == Reason::none) {
+      set_found_picture(loading, reader, names.front(), std::move(found), annotation, sample);
+      return;
+    }
+    if (i == 0) first = std::move(found);
+  }
+  set_found_picture(loading, reader, names.front(), std::move(first), annotation, sample);
+}
+
+void note_placeholders(Loading& loading, std::span<const manifests::Keypoint> keypoints,
+                       const SampleRecord& sample) {
+  const bool any = std::any_of(keypoints.begin(), keypoints.end(), [](const manifests::Keypoint& point) {
+    return point.v > 0.0F && is_placeholder(point.x_px, point.y_px);
+  });
+  if (!any) return;
+  loading.notes.count(
+      "labelled keypoints at (0, 0) or (-1, -1), where tools put points that nobody set, get weight 0",
+      sample.id, NoteKind::caution);
 }
 
 void check_box(RecordReader& reader, const std::string& field, const SampleRecord& sample) {
@@ -106,15 +133,19 @@ void set_family(Loading& loading, std::optional<Family> stated, std::optional<Fa
 }
 
 Dataset finished(Loading& loading, std::vector<SampleRecord> records) {
-  const auto note = [&](const char* text, std::size_t count) {
-    if (count > 0) loading.notes.add(fmt::format("{}: {}", text, count));
+  const auto note = [&](const char* text, std::size_t count, NoteKind kind = NoteKind::remark) {
+    if (count > 0) loading.notes.add(fmt::format("{}: {}", text, count), kind);
   };
   const PictureFinder& finder = loading.finder;
-  note("pictures with an absolute name from another disk, found by the last parts of the name",
+  note("pictures whose name leads to another disk or server, found by the last parts of the name",
        finder.found_by_tail());
   note("of these, names that lead to the same file as an earlier name (one of them must be wrong)",
-       finder.shared_files());
-  note("picture names that differ from the name of the file in letter case, '+' or .jpeg",
+       finder.shared_files(), NoteKind::caution);
+  note(
+      "picture names that are not paths below the root as they stand (backslashes, %20, \"..\", the root's "
+      "own name)",
+      finder.found_by_reading());
+  note("picture names that differ from the name of the file in letter case, accents, '+' or .jpeg",
        finder.found_by_spelling());
   std::vector<std::filesystem::path> files{loading.file};
   files.insert(files.end(), loading.more_files.begin(), loading.more_files.end());

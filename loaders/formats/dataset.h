@@ -2,9 +2,11 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "loaders/formats/note.h"
 #include "manifests/sample.h"
 
 namespace q3d::loaders::formats {
@@ -22,15 +24,19 @@ struct DatasetOptions {
 
   // The following options belong to the formats "coco" and "deeplabcut" only.
   std::filesystem::path
-      topology{};         // JSON file that names the keypoints (loaders/keypoints/topology_file.h); required
+      topology{};  // JSON file that names the keypoints (loaders/keypoints/topology_file.h); required
+  std::vector<std::string> categories{};  // "coco": names of the categories to take; empty takes all
   std::string species{};  // species of all animals; if empty, it comes from the file, if the file states it
   double min_confidence = 0.6;  // keypoints with less confidence get weight 0 (DeepLabCut's p-cutoff)
   double box_margin = 0.1;      // a box made from keypoints is enlarged by this share of its longer side
+  // "deeplabcut", rows that are frame numbers: the number of the picture that shows frame 0. Without it, the
+  // pictures must have the rows' own numbers.
+  std::optional<int> first_frame{};
 };
 
 struct Dataset {
   std::vector<manifests::SampleRecord> records;  // file order; unusable records carry their failure
-  std::vector<std::string> notes;                // remarks for the user (boxes read as xyxy, ...)
+  std::vector<Note> notes;                       // remarks for the user (boxes read as xyxy, ...)
   std::vector<std::filesystem::path> files;      // files that were read, except pictures
 };
 

@@ -3,16 +3,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <map>
 #include <optional>
 #include <set>
 #include <stdexcept>
 
+#include "loaders/formats/deeplabcut_files.h"
 #include "loaders/formats/formats.h"
 #include "loaders/formats/label_table.h"
+#include "loaders/formats/numbered_pictures.h"
 #include "loaders/keypoints/confidence.h"
+#include "loaders/keypoints/name_match.h"
 #include "loaders/keypoints/topology_file.h"
 #include "loaders/pictures/box.h"
 
@@ -28,9 +30,10 @@ using manifests::SampleRecord;
 constexpr std::string_view kNoAnimal = "single";
 
 struct PointColumns {
+  bool is_there = false;  // false: the file lacks the keypoint
   std::size_t x = 0;
   std::size_t y = 0;
-  std::optional<std::size_t> likelihood;
+  std::optional<std::size_t> likelihood{};
 };
 
 struct Individual {
@@ -44,16 +47,12 @@ struct FoundColumns {
   std::map<std::string, std::map<std::string, std::size_t>> of_bodypart;  // coordinate -> column
 };
 
-std::vector<PointColumns> in_order(const FoundColumns& found, const keypoints::Topology& topology,
+std::vector<PointColumns> in_order(const FoundColumns& found, const keypoints::NameMatch& match,
                                    const std::string& where) {
-  std::vector<int> order;
-  try {
-    order = keypoints::order_in_file(topology, found.bodyparts);
-  } catch (const std::invalid_argument& error) {
-    throw std::runtime_error(fmt::format("{}: bodyparts: {}", where, error.what()));
-  }
   std::vector<PointColumns> points;
-  for (const int place : order) {
+  for (const int place : match.places) {
+    PointColumns& point = points.emplace_back();
+    if (place < 0) continue;
     const std::string& bodypart = found.bodyparts[static_cast<std::size_t>(place)];
     const auto& columns = found.of_bodypart.at(bodypart);
     const auto x = columns.find("x");
@@ -62,14 +61,25 @@ std::vector<PointColumns> in_order(const FoundColumns& found, const keypoints::T
     if (x == columns.end() || y == columns.end()) {
       throw std::runtime_error(fmt::format("{}: {}: expected a column x and a column y", where, bodypart));
     }
-    points.push_back({x->second, y->second, {}});
-    if (likelihood != columns.end()) points.back().likelihood = likelihood->second;
+    point = {.is_there = true, .x = x->second, .y = y->second};
+    if (likelihood != columns.end()) point.likelihood = likelihood->second;
   }
   return points;
 }
 
+keypoints::NameMatch match_bodyparts(const keypoints::Topology& topology, const FoundColumns& found,
+                                     const std::string& where) {
+  try {
+    return keypoints::match_names(topology, found.bodyparts);
+  } catch (const std::invalid_argument& error) {
+    throw std::runtime_error(fmt::format("{}: bodyparts: {}", where, error.what()));
+  }
+}
+
+// `bodypart_notes` gets what the file lacks, and what the topology does not know.
 std::vector<Individual> individuals_of(const LabelTable& table, const keypoints::Topology& topology,
-                                       const fs::path& file, Notes& notes) {
+                                       const fs::path& file, Notes& notes,
+                                       std::set<std::string>& bodypart_notes) {
   std::vector<std::string> names;  // in the file's order
   std::map<std::string, FoundColumns> found;
   for (std::size_t i = 0; i < table.columns.size(); ++i) {
@@ -96,47 +106,20 @@ std::vector<Individual> individuals_of(const LabelTable& table, const keypoints:
       continue;
     }
     const std::string where = name.empty() ? file.string() : fmt::format("{}: {}", file.string(), name);
-    individuals.push_back({name, in_order(found[name], topology, where)});
+    const keypoints::NameMatch match = match_bodyparts(topology, found[name], where);
+    if (std::string note = match.note(topology); !note.empty()) bodypart_notes.insert(std::move(note));
+    individuals.push_back({name, in_order(found[name], match, where)});
   }
   return individuals;
 }
 
-// Maps the number of a frame to the picture whose name ends in it ("frames/img0012.png"). The predictions of
-// a video have no other link to their pictures.
-class NumberedPictures {
- public:
-  explicit NumberedPictures(const fs::path& folder) {
-    std::error_code error;
-    for (const auto& entry : fs::directory_iterator(folder, error)) {
-      const std::string stem = entry.path().stem().string();
-      const std::size_t first = stem.find_last_not_of("0123456789") + 1;  // npos + 1 = 0
-      std::int64_t number = 0;
-      const char* end = stem.data() + stem.size();
-      if (std::from_chars(stem.data() + first, end, number).ec == std::errc()) {
-        names_[number].insert(entry.path().filename().string());
-      }
-    }
-  }
-
-  // Returns the number itself if there is no such picture or more than one. No file has that name, so the
-  // record fails.
-  std::string name_of(const std::string& row) const {
-    std::int64_t number = -1;
-    std::from_chars(row.data(), row.data() + row.size(), number);
-    const auto found = names_.find(number);
-    return found == names_.end() || found->second.size() != 1 ? row : *found->second.begin();
-  }
-
- private:
-  std::map<std::int64_t, std::set<std::string>> names_;
-};
-
 // Without a likelihood, v is 1, which means labelled. A point without coordinates is not labelled, whatever
 // its likelihood.
 bool set_point(const LabelTable& table, std::size_t row, const PointColumns& columns, Keypoint& point) {
+  point = {};
+  if (!columns.is_there) return true;
   const double x = table.at(row, columns.x);
   const double y = table.at(row, columns.y);
-  point = {};
   if (std::isnan(x) || std::isnan(y)) return true;
   const double v = columns.likelihood ? table.at(row, *columns.likelihood) : 1.0;
   return set_keypoint(x, y, v, point);
@@ -176,51 +159,97 @@ class DeepLabCutLoader {
   }
 
  private:
-  // Returns the file that is named, or a project's labels below the folder that is named: CollectedData_*.h5,
-  // and the .csv where there is no .h5 beside it.
-  std::vector<fs::path> label_files() const {
+  // Returns the file that is named, or a project's labels below the folder that is named.
+  std::vector<fs::path> label_files() {
     const fs::path given = loading_.file;
     if (!fs::is_directory(given)) return {given};
-    std::set<fs::path> found;
-    for (const auto& entry : fs::recursive_directory_iterator(given)) {
-      const fs::path& path = entry.path();
-      if (!path.filename().string().starts_with("CollectedData_") || !entry.is_regular_file()) continue;
-      const bool is_hdf5 = path.extension() == ".h5";
-      const bool is_lone_csv =
-          path.extension() == ".csv" && !fs::exists(fs::path(path).replace_extension(".h5"));
-      if (is_hdf5 || is_lone_csv) found.insert(path);
-    }
-    if (!found.empty()) return {found.begin(), found.end()};
-    throw std::runtime_error(fmt::format(
-        "{}: got a folder without labels, expected DeepLabCut's CollectedData_*.h5 or .csv in or below it",
-        given.string()));
+    return project_label_files(given, loading_.options.root, loading_.notes);
   }
 
   void read_file(const fs::path& file) {
     const LabelTable table = read_label_table(file);
-    const std::vector<Individual> individuals = individuals_of(table, topology_, file, loading_.notes);
-    std::optional<NumberedPictures> numbered;
-    if (table.rows_are_numbers && !table.rows.empty()) {
-      numbered.emplace(loading_.options.root / loading_.options.images);
-      loading_.notes.add(
-          fmt::format("{}: the rows are frame numbers; each row takes the picture in \"images\" whose name "
-                      "ends in its number",
-                      file.filename().string()));
+    std::set<std::string> bodypart_notes;
+    const std::vector<Individual> individuals =
+        individuals_of(table, topology_, file, loading_.notes, bodypart_notes);
+    for (const std::string& note : bodypart_notes) {
+      loading_.notes.count_files(note, name_for_people(file), NoteKind::caution);
     }
+    const std::vector<PicturePlace> pictures =
+        table.rows_are_numbers ? numbered_pictures(table, file) : named_pictures(table, file);
     for (std::size_t row = 0; row < table.rows.size(); ++row) {
-      const std::string picture = numbered ? numbered->name_of(table.rows[row]) : table.rows[row];
       for (const Individual& individual : individuals) {
         if (is_absent(table, row, individual)) {
           ++absent_;
         } else {
-          add_sample(table, row, individual, file, picture);
+          add_sample(table, row, individual, file, pictures[row]);
         }
       }
     }
   }
 
+  // A row's picture: its name for the sample's id, and the folder in which to look for it first.
+  struct PicturePlace {
+    std::string name;
+    fs::path beside{};  // empty: by the name as it stands
+  };
+
+  std::vector<PicturePlace> numbered_pictures(const LabelTable& table, const fs::path& file) {
+    std::vector<PicturePlace> pictures;
+    if (table.rows.empty()) return pictures;
+    const fs::path folder = loading_.options.root / loading_.options.images;
+    const NumberedPictures numbered(folder);
+    const std::optional<int> first_frame = loading_.options.first_frame;
+    if (const std::string doubt = numbered.doubt(table.rows); !first_frame && !doubt.empty()) {
+      throw std::runtime_error(fmt::format(
+          "{}: got {} in {}, so it is not certain which picture shows which frame; expected pictures with "
+          "the "
+          "frames' own numbers. Set the key \"first_frame\" of the dataset to the number of the picture that "
+          "shows frame 0 (1 for pictures that ffmpeg numbered, 0 if the pictures have the frames' own "
+          "numbers)",
+          file.string(), doubt, folder.string()));
+    }
+    loading_.notes.add(fmt::format(
+        "{}: the rows are frame numbers; each row takes the picture in \"images\" "
+        "whose name ends in its number{}",
+        name_for_people(file), first_frame ? fmt::format(" plus first_frame {}", *first_frame) : ""));
+    for (const std::string& row : table.rows)
+      pictures.push_back({numbered.name_of(row, first_frame.value_or(0))});
+    return pictures;
+  }
+
+  // DeepLabCut keeps the labels of a folder of pictures in that folder, so pictures are looked for there
+  // first: the folder may have been renamed since, or the rows may name no folder. A table whose rows name
+  // several folders was put together from several, so only the names count.
+  std::vector<PicturePlace> named_pictures(const LabelTable& table, const fs::path& file) const {
+    std::set<std::string> folders;
+    for (const std::string& row : table.rows) {
+      const std::vector<NameReading> readings = readings_of(row);
+      folders.insert(readings.empty() ? "" : readings.front().path.parent_path().filename().string());
+    }
+    const fs::path beside = folders.size() == 1 ? file.parent_path() : fs::path();
+    const fs::path own_folder = loading_.finder.relative_to_root(file.parent_path());
+    std::vector<PicturePlace> pictures;
+    for (const std::string& row : table.rows) {
+      const bool has_folder = row.find('/') != std::string::npos;
+      pictures.push_back({has_folder ? row : (own_folder / row).generic_string(), beside});
+    }
+    return pictures;
+  }
+
+  std::string name_for_people(const fs::path& file) const {
+    const fs::path relative = loading_.finder.relative_to_root(file);
+    return relative.empty() ? file.filename().string() : relative.generic_string();
+  }
+
+  FoundPicture find_picture(const PicturePlace& picture) {
+    if (!picture.beside.empty()) {
+      if (auto found = loading_.finder.find_in(picture.beside, picture.name)) return std::move(*found);
+    }
+    return loading_.finder.find(picture.name);
+  }
+
   void add_sample(const LabelTable& table, std::size_t row, const Individual& individual,
-                  const fs::path& file, const std::string& picture) {
+                  const fs::path& file, const PicturePlace& picture) {
     static const nlohmann::json kNoRecord = nlohmann::json::object();
     SampleRecord& sample = records_.emplace_back();
     annotations_.push_back(individual.name.empty() ? "0" : individual.name);
@@ -234,7 +263,9 @@ class DeepLabCutLoader {
                   fmt::format("({}, {})", table.at(row, columns.x), table.at(row, columns.y)),
                   fmt::format("a position within {} px and a finite likelihood", kMaxCoordinatePx));
     }
-    set_picture(loading_, reader, picture, "picture", annotations_.back(), sample);
+    set_found_picture(loading_, reader, {picture.name, "picture"}, find_picture(picture), annotations_.back(),
+                      sample);
+    note_placeholders(loading_, points, sample);
     weights_.apply(points);
     sample.keypoints = keypoints::to_animal3d(topology_, points);
     check_visible(reader, "keypoints", sample);

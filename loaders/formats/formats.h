@@ -2,7 +2,9 @@
 #pragma once
 
 #include <filesystem>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "loaders/formats/dataset.h"
 #include "loaders/formats/notes.h"
@@ -29,9 +31,23 @@ struct Loading {
   Notes notes;
 };
 
-// Sets dataset, split, id and picture of a sample. `annotation` is the last part of the id.
-void set_picture(Loading& loading, RecordReader& reader, const std::string& name, const std::string& field,
+// A name of a picture and the field that gives it.
+struct PictureName {
+  std::string name;
+  std::string field;
+};
+
+// Sets dataset, split, id and picture of a sample. The picture is that of the first name that leads to one;
+// the first name of all is part of the id. `annotation` is the last part of the id.
+void set_picture(Loading& loading, RecordReader& reader, const std::vector<PictureName>& names,
                  const std::string& annotation, manifests::SampleRecord& sample);
+// Sets the same from a picture that was looked for already.
+void set_found_picture(Loading& loading, RecordReader& reader, const PictureName& name, FoundPicture found,
+                       const std::string& annotation, manifests::SampleRecord& sample);
+
+// Notes the keypoints that are labelled but lie where tools put points that nobody set (is_placeholder).
+void note_placeholders(Loading& loading, std::span<const manifests::Keypoint> keypoints,
+                       const manifests::SampleRecord& sample);
 
 // These fail samples whose box has no area or lies outside the image, and samples without a visible keypoint.
 void check_box(RecordReader& reader, const std::string& field, const manifests::SampleRecord& sample);

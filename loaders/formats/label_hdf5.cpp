@@ -13,6 +13,7 @@
 // HDF5 1.10 reads beyond its own buffers where an attribute's name is damaged (H5O__attr_exists), so the file
 // is read in a process of its own.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <chrono>
@@ -305,14 +306,31 @@ void read_rows(const PandasGroup& group, LabelTable& table) {
   }
 }
 
+// The first names of a file, which could have thousands.
+std::string joined_names(const std::vector<std::string>& names) {
+  constexpr std::size_t kShown = 20;
+  std::string text = fmt::format(
+      "{}", fmt::join(names.begin(),
+                      names.begin() + static_cast<std::ptrdiff_t>(std::min(names.size(), kShown)), ", "));
+  return names.size() > kShown ? text + fmt::format(" and {} more", names.size() - kShown) : text;
+}
+
 // Returns the group that holds the DataFrame: the one with DeepLabCut's name, else the only group of the
 // file.
 std::string frame_group(hid_t file) {
   constexpr const char* kUsual = "df_with_missing";
   if (H5Lexists(file, kUsual, H5P_DEFAULT) > 0) return kUsual;
   const std::vector<std::string> names = manifests::hdf5::link_names(file, "root group");
-  if (names.size() != 1) refuse("root group", fmt::format("{} members", names.size()), kUsual);
-  return names.front();
+  if (names.size() == 1) return names.front();
+  const auto has = [&](const char* name) {
+    return std::find(names.begin(), names.end(), name) != names.end();
+  };
+  const bool is_sleap = (has("tracks") && has("node_names")) || (has("instances") && has("points"));
+  refuse("root group", fmt::format("the members {}", names.empty() ? "(none)" : joined_names(names)),
+         is_sleap
+             ? fmt::format("{}. This is SLEAP's file: export the project to COCO, see docs/own-labels.md",
+                           kUsual)
+             : fmt::format("{}, or one table alone. Save the table that you want under this key", kUsual));
 }
 
 LabelTable read_open_file(hid_t file, std::uint64_t file_bytes) {

@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
 
+#include "loaders/formats/folded_name.h"
 #include "manifests/file_descriptor.h"
 
 namespace q3d::loaders::formats {
@@ -32,21 +32,6 @@ bool lies_in(const fs::path& path, const fs::path& folder) {
   return std::mismatch(folder.begin(), folder.end(), path.begin(), path.end()).first == folder.end();
 }
 
-bool climbs_out(const fs::path& normal) {
-  return !normal.empty() && *normal.begin() == "..";
-}
-
-// Returns the same text for paths that people would call the same: regardless of case, '+' for a space, and
-// .jpeg or .jpe for .jpg.
-std::string folded(const fs::path& path) {
-  std::string text = path.generic_string();
-  for (char& c : text) c = c == '+' ? ' ' : static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  for (const std::string_view ending : {".jpeg", ".jpe"}) {
-    if (text.ends_with(ending)) return text.substr(0, text.size() - ending.size()) + ".jpg";
-  }
-  return text;
-}
-
 // An error that says nothing about whether the file is there must not make its picture a missing one.
 void require_answer(const std::error_code& error, const char* doing, const fs::path& path) {
   if (error && !manifests::names_no_file(error.value())) {
@@ -62,62 +47,147 @@ fs::path without_first(const fs::path& path) {
 
 }  // namespace
 
-PictureFinder::PictureFinder(const fs::path& root, const fs::path& images, const fs::path& default_images) {
-  const fs::path resolved_root = resolved_folder(root, "dataset root");
-  allowed_.push_back(resolved_root);
-  if (!images.empty()) {
-    bases_.push_back(resolved_folder(resolved_root / images, "folder of pictures"));
+PictureFinder::PictureFinder(const PictureFolders& folders)
+    : root_(resolved_folder(folders.root, "dataset root")) {
+  allowed_.push_back(root_);
+  if (!folders.images.empty()) {
+    bases_.push_back(resolved_folder(root_ / folders.images, "folder of pictures"));
     allowed_.push_back(bases_.front());
-  } else if (!default_images.empty() && fs::is_directory(resolved_root / default_images)) {
-    bases_.push_back(resolved_root / default_images);
+  } else if (!folders.default_images.empty() && fs::is_directory(root_ / folders.default_images)) {
+    bases_.push_back(root_ / folders.default_images);
   }
-  if (bases_.empty() || bases_.front() != resolved_root) bases_.push_back(resolved_root);
-  images_name_ = bases_.front().filename().string();
+  if (bases_.empty() || bases_.front() != root_) bases_.push_back(root_);
+  std::error_code error;
+  const fs::path annotations = fs::canonical(root_ / folders.annotations, error);
+  if (error || !lies_in_allowed(annotations)) return;
+  annotations_ = annotations;
+  if (std::find(bases_.begin(), bases_.end(), annotations) == bases_.end()) bases_.push_back(annotations);
 }
 
 FoundPicture PictureFinder::find(const std::string& name) {
   if (name.empty() || name.size() > kMaxNameLength || name.find('\0') != std::string::npos) {
     return {{}, Reason::record_malformed, fmt::format("a name of {} bytes", name.size())};
   }
-  const fs::path normal = fs::path(name).lexically_normal();
-  return normal.is_absolute() ? find_absolute(normal) : find_relative(normal);
+  const std::vector<NameReading> readings = readings_of(name);
+  if (readings.empty()) return {{}, Reason::image_missing, fmt::format("\"{}\", which names no file", name)};
+  for (std::size_t i = 0; i < readings.size(); ++i) {
+    auto found = find_exactly(readings[i]);
+    if (!found) continue;
+    if (i > 0 && !readings[i].is_absolute && found->failure == Reason::none) ++found_by_reading_;
+    return std::move(*found);
+  }
+  for (const NameReading& reading : readings) {
+    if (auto found = find_by_spelling(reading)) return std::move(*found);
+  }
+  return not_found(readings);
 }
 
-FoundPicture PictureFinder::find_relative(const fs::path& name) {
-  if (climbs_out(name)) {
-    return {{}, Reason::path_escapes_root, fmt::format("{}, which leaves the root", name.string())};
+std::optional<FoundPicture> PictureFinder::find_in(const fs::path& folder, const std::string& name) {
+  std::error_code error;
+  const fs::path resolved = fs::canonical(folder, error);
+  if (error || !lies_in_allowed(resolved) || name.size() > kMaxNameLength) return std::nullopt;
+  for (const NameReading& reading : readings_of(name)) {
+    if (auto found = existing(resolved / reading.path.filename())) return found;
   }
-  if (auto found = below_bases(name)) return std::move(*found);
-  std::optional<FoundPicture> found = by_spelling(name);
-  if (!found && *name.begin() == images_name_) found = by_spelling(without_first(name));
-  if (found) return std::move(*found);
-  return {{},
-          Reason::image_missing,
-          fmt::format("{}, which is not below {}", name.string(), bases_.front().string())};
+  return std::nullopt;
 }
 
-FoundPicture PictureFinder::find_absolute(const fs::path& name) {
-  if (std::any_of(allowed_.begin(), allowed_.end(),
-                  [&](const fs::path& folder) { return lies_in(name, folder); })) {
-    if (auto found = existing(name)) return std::move(*found);
+fs::path PictureFinder::relative_to_root(const fs::path& path) const {
+  std::error_code error;
+  const fs::path resolved = fs::canonical(path, error);
+  return error || !lies_in(resolved, root_) ? fs::path() : resolved.lexically_relative(root_);
+}
+
+std::optional<FoundPicture> PictureFinder::find_exactly(const NameReading& reading) {
+  if (reading.is_absolute) return find_absolute(reading);
+  if (climbs_out(reading.path)) return find_climbing(reading.path);
+  if (auto found = below_bases(reading.path)) return found;
+  for (const fs::path& tail : own_tails(reading.path)) {
+    auto found = below_bases(tail);
+    if (!found) continue;
+    if (found->failure == Reason::none) ++found_by_reading_;
+    return found;
   }
-  for (fs::path tail = name.relative_path(); !tail.empty(); tail = without_first(tail)) {
-    if (auto found = below_bases(tail)) {
-      if (found->failure == Reason::none) {
-        ++found_by_tail_;
-        const auto known = name_of_tail_.emplace(found->path.string(), name.string());
-        if (!known.second && known.first->second != name) ++shared_files_;
-      }
-      return std::move(*found);
+  return std::nullopt;
+}
+
+std::optional<FoundPicture> PictureFinder::find_absolute(const NameReading& reading) {
+  const std::string name = "/" + reading.path.string();
+  if (reading.is_posix_absolute && lies_in_allowed(name)) {
+    if (auto found = existing(name)) return found;
+  }
+  for (fs::path tail = reading.path; !tail.empty(); tail = without_first(tail)) {
+    auto found = below_bases(tail);
+    if (!found) continue;
+    if (found->failure == Reason::none) {
+      ++found_by_tail_;
+      const auto known = name_of_tail_.emplace(found->path.string(), name);
+      if (!known.second && known.first->second != name) ++shared_files_;
+    }
+    return found;
+  }
+  return std::nullopt;
+}
+
+std::optional<FoundPicture> PictureFinder::find_climbing(const fs::path& path) {
+  std::vector<fs::path> folders = bases_;
+  if (!annotations_.empty()) folders.insert(folders.begin(), annotations_);
+  for (const fs::path& folder : folders) {
+    const fs::path meant = (folder / path).lexically_normal();
+    if (!lies_in_allowed(meant)) continue;
+    auto found = existing(meant);
+    if (!found) continue;
+    if (found->failure == Reason::none) ++found_by_reading_;
+    return found;
+  }
+  return std::nullopt;
+}
+
+// Returns what follows the name of the root, or of the folder of pictures, in a path.
+std::vector<fs::path> PictureFinder::own_tails(const fs::path& path) const {
+  std::vector<fs::path> tails;
+  for (fs::path rest = path; std::distance(rest.begin(), rest.end()) > 1;) {
+    const fs::path first = *rest.begin();
+    rest = without_first(rest);
+    if (first == root_.filename() || first == bases_.front().filename()) tails.push_back(rest);
+  }
+  return tails;
+}
+
+std::optional<FoundPicture> PictureFinder::find_by_spelling(const NameReading& reading) {
+  if (reading.is_absolute) {
+    for (fs::path tail = reading.path; !tail.empty(); tail = without_first(tail)) {
+      if (auto found = by_spelling(tail)) return found;
+    }
+    return std::nullopt;
+  }
+  if (climbs_out(reading.path)) return std::nullopt;
+  if (auto found = by_spelling(reading.path)) return found;
+  for (const fs::path& tail : own_tails(reading.path)) {
+    if (auto found = by_spelling(tail)) return found;
+  }
+  return std::nullopt;
+}
+
+// A POSIX path that is absolute or climbs out is an escape; every other name is that of a missing picture.
+FoundPicture PictureFinder::not_found(const std::vector<NameReading>& readings) const {
+  for (const NameReading& reading : readings) {
+    if (!reading.is_absolute && climbs_out(reading.path)) {
+      return {{},
+              Reason::path_escapes_root,
+              fmt::format("{}, which leaves the root or names nothing in it", reading.path.string())};
     }
   }
-  for (fs::path tail = name.relative_path(); !tail.empty(); tail = without_first(tail)) {
-    if (auto found = by_spelling(tail)) return std::move(*found);
+  const NameReading& first = readings.front();
+  if (first.is_posix_absolute) {
+    return {{},
+            Reason::path_escapes_root,
+            fmt::format("/{}, which is outside the root, and no file of its name is below {}",
+                        first.path.string(), bases_.front().string())};
   }
   return {{},
-          Reason::path_escapes_root,
-          fmt::format("{}, which is outside the root, and no file of its name is below {}", name.string(),
-                      bases_.front().string())};
+          Reason::image_missing,
+          fmt::format("{}, which is not below {}", first.path.string(), bases_.front().string())};
 }
 
 std::optional<FoundPicture> PictureFinder::below_bases(const fs::path& relative) {
@@ -127,31 +197,39 @@ std::optional<FoundPicture> PictureFinder::below_bases(const fs::path& relative)
   return std::nullopt;
 }
 
+const PictureFinder::Spellings& PictureFinder::spellings_below(const fs::path& base) {
+  const auto [known, is_new] = spellings_.try_emplace(base);
+  if (!is_new) return known->second;
+  std::error_code error;
+  const auto options = fs::directory_options::skip_permission_denied;
+  for (fs::recursive_directory_iterator it(base, options, error), end; !error && it != end;
+       it.increment(error)) {
+    std::error_code ignored;
+    if (it->is_directory(ignored)) continue;
+    known->second[folded_name(it->path().lexically_relative(base).generic_string())].push_back(it->path());
+  }
+  require_answer(error, "list", base);
+  return known->second;
+}
+
 std::optional<FoundPicture> PictureFinder::by_spelling(const fs::path& relative) {
-  if (!spellings_) {
-    spellings_.emplace();
-    std::error_code error;
-    const auto options = fs::directory_options::skip_permission_denied;
-    for (fs::recursive_directory_iterator it(bases_.front(), options, error), end; !error && it != end;
-         it.increment(error)) {
-      std::error_code ignored;
-      if (!it->is_directory(ignored)) {
-        (*spellings_)[folded(it->path().lexically_relative(bases_.front()))].push_back(it->path());
-      }
+  const std::string folded = folded_name(relative.generic_string());
+  for (const fs::path& base : bases_) {
+    const Spellings& spellings = spellings_below(base);
+    const auto found = spellings.find(folded);
+    if (found == spellings.end()) continue;
+    if (found->second.size() > 1) {
+      const auto [first, last] = std::minmax_element(found->second.begin(), found->second.end());
+      return FoundPicture{
+          {},
+          Reason::image_missing,
+          fmt::format("{}, which could be {} or {}", relative.string(), first->string(), last->string())};
     }
-    require_answer(error, "list", bases_.front());
+    std::optional<FoundPicture> picture = existing(found->second.front());
+    if (picture && picture->failure == Reason::none) ++found_by_spelling_;
+    if (picture) return picture;
   }
-  const auto found = spellings_->find(folded(relative));
-  if (found == spellings_->end()) return std::nullopt;
-  if (found->second.size() > 1) {
-    return FoundPicture{{},
-                        Reason::image_missing,
-                        fmt::format("{}, which could be {} or {}", relative.string(),
-                                    found->second[0].string(), found->second[1].string())};
-  }
-  std::optional<FoundPicture> picture = existing(found->second.front());
-  if (picture && picture->failure == Reason::none) ++found_by_spelling_;
-  return picture;
+  return std::nullopt;
 }
 
 // Returns nothing if there is no such file, and a failure if it must not or cannot be read.
@@ -176,7 +254,7 @@ std::optional<FoundPicture> PictureFinder::existing(const fs::path& path) {
     require_answer(error, "resolve", path.parent_path());
     resolved = folder / path.filename();
   }
-  if (!is_allowed(resolved)) {
+  if (!lies_in_allowed(resolved)) {
     return FoundPicture{{},
                         Reason::path_escapes_root,
                         fmt::format("{}, a link to {} outside the root", path.string(), resolved.string())};
@@ -184,18 +262,9 @@ std::optional<FoundPicture> PictureFinder::existing(const fs::path& path) {
   return FoundPicture{resolved, Reason::none, {}};
 }
 
-bool PictureFinder::is_allowed(const fs::path& resolved) const {
+bool PictureFinder::lies_in_allowed(const fs::path& path) const {
   return std::any_of(allowed_.begin(), allowed_.end(),
-                     [&](const fs::path& folder) { return lies_in(resolved, folder); });
-}
-
-std::string id_part(std::string_view name) {
-  const fs::path normal = fs::path(name).lexically_normal();
-  std::string part =
-      normal.is_absolute() || climbs_out(normal) ? normal.filename().string() : normal.generic_string();
-  std::replace_if(
-      part.begin(), part.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '_');
-  return part;
+                     [&](const fs::path& folder) { return lies_in(path, folder); });
 }
 
 }  // namespace q3d::loaders::formats

@@ -3,12 +3,13 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <unordered_map>
 #include <vector>
 
+#include "loaders/formats/picture_name.h"
 #include "manifests/sample.h"
 
 namespace q3d::loaders::formats {
@@ -19,53 +20,73 @@ struct FoundPicture {
   std::string got;  // for people: where the name led to
 };
 
-// Looks names up in the folder of pictures and in the root:
-// - A relative name is used as it is. A name that climbs out with ".." fails.
-// - An absolute name inside the root is used as it is. An absolute name from the author's own disk is looked
-//   up by its last components: by the longest tail that names a file here (only the base name if the pictures
-//   lie in one flat folder).
-// - If this finds nothing, the same is tried without regard to letter case, with '+' for a space, and .jpeg
-//   for .jpg.
-// If several files match, none is taken. Symbolic links must not lead out of the root, nor out of the folder
-// of pictures if the user named one.
+// The folders that names count from. All of them are relative to the root unless they are absolute.
+struct PictureFolders {
+  std::filesystem::path root;
+  std::filesystem::path images;          // named by the user; it may lie outside the root
+  std::filesystem::path default_images;  // the format's own, used if `images` is empty and the root has it
+  std::filesystem::path annotations;     // folder of the annotation file; empty if it is not known
+};
+
+// Looks up a name in each of its readings (picture_name.h), the most literal one first:
+// - A relative path counts from the folder of pictures, from the root, and then from the annotation file's
+//   folder. A path that climbs out with ".." counts from the annotation file's folder first. If a path begins
+//   with the name of the root or of the folder of pictures ("dogs/images/a.jpg"), what follows is looked up.
+// - An absolute path inside the root is used as it is. An absolute path of another disk or server is looked
+// up
+//   by its last components: by the longest tail that names a file here.
+// - If this finds nothing, the same is tried without regard to letter case, to the way in which accents are
+//   written (Unicode NFC and NFD), with '+' for a space, and .jpeg for .jpg.
+// If several files match, none is taken. Nothing outside the root is ever taken, however it is spelled,
+// except below the folder of pictures if the user named one. Symbolic links must not lead out of them either.
 class PictureFinder {
  public:
-  // `images` is relative to root unless it is absolute. If it is empty, `default_images` is used if root has
-  // such a folder, else root. Throws std::runtime_error if a folder does not exist.
-  PictureFinder(const std::filesystem::path& root, const std::filesystem::path& images,
-                const std::filesystem::path& default_images);
+  // Throws std::runtime_error if the root or the named folder of pictures does not exist.
+  explicit PictureFinder(const PictureFolders& folders);
 
   // Throws manifests::IoError if the system does not say whether a file is there (EIO, EACCES, ...).
   FoundPicture find(const std::string& name);
 
-  std::size_t found_by_tail() const { return found_by_tail_; }          // absolute names from another disk
-  std::size_t found_by_spelling() const { return found_by_spelling_; }  // case, '+', .jpeg
-  // Further names that led to a file found in this way before.
+  // Looks for the base name of `name` in `folder`. Returns nothing if it is not there, or if the folder is
+  // outside the root. Throws as find does.
+  std::optional<FoundPicture> find_in(const std::filesystem::path& folder, const std::string& name);
+
+  // Returns the path relative to the root; empty if it lies outside.
+  std::filesystem::path relative_to_root(const std::filesystem::path& path) const;
+
+  std::size_t found_by_tail() const { return found_by_tail_; }        // absolute names from elsewhere
+  std::size_t found_by_reading() const { return found_by_reading_; }  // backslashes, %20, "../", root's name
+  std::size_t found_by_spelling() const { return found_by_spelling_; }  // case, accents, '+', .jpeg
+  // Further names that led to a file found by its tail before.
   std::size_t shared_files() const { return shared_files_; }
 
  private:
+  using Spellings = std::unordered_map<std::string, std::vector<std::filesystem::path>>;
+
   std::optional<FoundPicture> existing(const std::filesystem::path& path);
   std::optional<FoundPicture> below_bases(const std::filesystem::path& relative);
   std::optional<FoundPicture> by_spelling(const std::filesystem::path& relative);
-  FoundPicture find_absolute(const std::filesystem::path& name);
-  FoundPicture find_relative(const std::filesystem::path& name);
-  bool is_allowed(const std::filesystem::path& resolved) const;
+  std::optional<FoundPicture> find_exactly(const NameReading& reading);
+  std::optional<FoundPicture> find_absolute(const NameReading& reading);
+  std::optional<FoundPicture> find_climbing(const std::filesystem::path& path);
+  std::vector<std::filesystem::path> own_tails(const std::filesystem::path& path) const;
+  std::optional<FoundPicture> find_by_spelling(const NameReading& reading);
+  FoundPicture not_found(const std::vector<NameReading>& readings) const;
+  const Spellings& spellings_below(const std::filesystem::path& base);
+  bool lies_in_allowed(const std::filesystem::path& path) const;
 
-  std::vector<std::filesystem::path> bases_;    // resolved folders that are searched, in this order
-  std::vector<std::filesystem::path> allowed_;  // resolved folders that pictures may lie in
-  std::string images_name_;                     // last component of the pictures' folder
-  // Folded relative path -> the files with this spelling. Filled when it is first needed.
-  std::optional<std::unordered_map<std::string, std::vector<std::filesystem::path>>> spellings_;
+  std::filesystem::path root_;
+  std::vector<std::filesystem::path> bases_;    // folders that relative names count from, in order
+  std::vector<std::filesystem::path> allowed_;  // folders that pictures may lie in
+  std::filesystem::path annotations_;           // empty if it lies outside these
   std::unordered_map<std::string, std::filesystem::path> resolved_folders_;
+  std::map<std::filesystem::path, Spellings> spellings_;  // of a base: folded name -> files; filled on demand
   std::size_t found_by_tail_ = 0;
+  std::size_t found_by_reading_ = 0;
   std::size_t found_by_spelling_ = 0;
   std::unordered_map<std::string, std::string>
       name_of_tail_;  // file found by a tail -> the first name that led to it
   std::size_t shared_files_ = 0;
 };
-
-// Returns the name as it appears in a sample id: relative to the root, without "." and "..", on one line. If
-// the file gives an absolute name or one that climbs out, it is the base name.
-std::string id_part(std::string_view name);
 
 }  // namespace q3d::loaders::formats

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "loaders/formats/formats.h"
+#include "loaders/formats/several_animals.h"
 #include "manifests/json_file.h"
 
 namespace q3d::loaders::formats {
@@ -98,17 +99,23 @@ void set_mask(RecordReader& reader, Loading& loading, SampleRecord& sample) {
   }
 }
 
-SampleRecord read_record(const nlohmann::json& record, std::size_t index, Loading& loading) {
+// `place` is the record's place in the file: "12", or "12.1" for the second animal of a record.
+SampleRecord read_record(const nlohmann::json& record, const std::string& place, Loading& loading) {
   SampleRecord sample;
-  RecordReader reader(record, fmt::format("{}: data[{}]", loading.file.string(), index), sample);
-  set_picture(loading, reader, reader.text("img_path"), "img_path", std::to_string(index), sample);
+  RecordReader reader(record, fmt::format("{}: data[{}]", loading.file.string(), place), sample);
+  set_picture(loading, reader, {{reader.text("img_path"), "img_path"}}, place, sample);
   set_mask(reader, loading, sample);
   sample.width_px = reader.size_px("width");
   sample.height_px = reader.size_px("height");
+  if (holds_several_animals(record)) {
+    reader.fail(Reason::record_malformed, "bbox", fmt::format("boxes of {} animals", record["bbox"].size()),
+                "one record an animal, or keypoint_2d, pose and the other fields with one list an animal");
+  }
   sample.box = reader.box("bbox");
   check_box(reader, "bbox", sample);
   const auto keypoints = reader.keypoints("keypoint_2d", kKeypoints);
   std::copy(keypoints.begin(), keypoints.end(), sample.keypoints.begin());
+  note_placeholders(loading, keypoints, sample);
   check_visible(reader, "keypoint_2d", sample);
   sample.truth = read_truth(record, reader, loading, sample.id);
   sample.species = species::species_of_picture(sample.image_ref, "");
@@ -124,7 +131,19 @@ Dataset load_prima(const DatasetOptions& options) {
   const nlohmann::json& data = manifests::array_of(document, "data", loading.file);
   std::vector<SampleRecord> records;
   records.reserve(data.size());
-  for (std::size_t i = 0; i < data.size(); ++i) records.push_back(read_record(data[i], i, loading));
+  std::size_t split = 0;
+  for (std::size_t i = 0; i < data.size(); ++i) {
+    const std::vector<nlohmann::json> animals = one_record_an_animal(data[i]);
+    if (animals.empty()) records.push_back(read_record(data[i], std::to_string(i), loading));
+    for (std::size_t k = 0; k < animals.size(); ++k) {
+      records.push_back(read_record(animals[k], fmt::format("{}.{}", i, k), loading));
+    }
+    split += animals.empty() ? 0 : 1;
+  }
+  if (split > 0) {
+    loading.notes.add(
+        fmt::format("records that hold several animals, each of which becomes a sample: {}", split));
+  }
   return finished(loading, std::move(records));
 }
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -73,10 +74,19 @@ std::optional<std::int64_t> RecordReader::integer(const std::string& field) {
 }
 
 int RecordReader::size_px(const std::string& field) {
-  const auto size = integer(field);
-  if (!size) return 0;
-  if (*size >= 1 && *size <= static_cast<std::int64_t>(kMaxCoordinatePx)) return static_cast<int>(*size);
-  fail(Reason::record_malformed, field, std::to_string(*size), "a size in pixels");
+  const nlohmann::json* value = find(field);
+  if (value == nullptr || manifests::is_beyond_json(*value)) return 0;
+  double size = kNaN;
+  if (value->is_number()) size = value->get<double>();
+  if (value->is_string()) {
+    const auto& text = value->get_ref<const std::string&>();
+    if (text.empty()) return 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), size);
+    if (error != std::errc() || end != text.data() + text.size()) size = kNaN;
+  }
+  if (size <= 0.0) return 0;
+  if (size == std::floor(size) && size <= kMaxCoordinatePx) return static_cast<int>(size);
+  fail(Reason::record_malformed, field, manifests::describe(*value), "a size in whole pixels");
   return 0;
 }
 
@@ -145,13 +155,17 @@ std::vector<double> RecordReader::finite_numbers(const std::string& field, std::
   return {};
 }
 
+bool is_placeholder(double x_px, double y_px) {
+  return x_px == y_px && (x_px == 0.0 || x_px == -1.0);
+}
+
 bool set_keypoint(double x_px, double y_px, double v, manifests::Keypoint& keypoint) {
   const bool is_position = std::abs(x_px) <= kMaxCoordinatePx && std::abs(y_px) <= kMaxCoordinatePx;
   keypoint = {};
   if (std::isnan(v) && !is_position) return true;  // all of it missing, as pandas writes it
   if (!std::isfinite(static_cast<float>(v)) || (v > 0.0 && !is_position)) return false;
   keypoint.v = static_cast<float>(v);
-  keypoint.weight = v > 0.0 ? 1.0F : 0.0F;
+  keypoint.weight = v > 0.0 && !is_placeholder(x_px, y_px) ? 1.0F : 0.0F;
   if (is_position) {
     keypoint.x_px = x_px;
     keypoint.y_px = y_px;

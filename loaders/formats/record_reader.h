@@ -31,7 +31,8 @@ class RecordReader {
   std::string optional_text(const std::string& field);     // "" if it is absent
   std::optional<double> number(const std::string& field);  // nothing if it is absent; NaN if it is not finite
   std::optional<std::int64_t> integer(const std::string& field);  // nothing if it is absent
-  // Returns a size of the image in pixels; 0 if it is absent.
+  // Returns a size of the image in pixels, a number or a text of one; 0 if it is absent, 0 or negative, as
+  // tools write where they do not know it.
   int size_px(const std::string& field);
 
   // Returns `rows` x `columns` numbers, which may be nested or flat. A number that is null or not finite is
@@ -42,8 +43,8 @@ class RecordReader {
   // The same for a field that must be complete and have only numbers that are finite in float32.
   std::vector<double> finite_numbers(const std::string& field, std::size_t rows, std::size_t columns);
 
-  // Returns x, y, v of `count` keypoints. The weight is 1 if v > 0, else 0. Unlabelled points may have any
-  // coordinates.
+  // Returns x, y, v of `count` keypoints. The weight is 1 if v > 0 and the point is no placeholder, else 0.
+  // Unlabelled points may have any coordinates.
   std::vector<manifests::Keypoint> keypoints(const std::string& field, std::size_t count);
   // Returns four numbers as they stand, the last two as width and height.
   manifests::Box box(const std::string& field);
@@ -62,7 +63,11 @@ class RecordReader {
 // A labelled keypoint must lie within this many pixels of the origin. A larger number is not a coordinate.
 inline constexpr double kMaxCoordinatePx = 1e6;
 
-// Makes a keypoint of x, y, v. Returns false if it is labelled (v > 0) but x, y is not a coordinate.
+// Whether tools put a point that nobody set at this place: (0, 0) or (-1, -1).
+bool is_placeholder(double x_px, double y_px);
+
+// Makes a keypoint of x, y, v. A placeholder has weight 0, whatever its v. Returns false if the keypoint is
+// labelled (v > 0) but x, y is not a coordinate.
 bool set_keypoint(double x_px, double y_px, double v, manifests::Keypoint& keypoint);
 
 }  // namespace q3d::loaders::formats

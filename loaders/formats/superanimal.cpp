@@ -22,7 +22,7 @@ bool has_neck_at_the_shoulders(std::string_view source) {
                    species::normalised_source(source)) != kNeckAtTheShoulders.end();
 }
 
-void add_species(Loading& loading, RecordReader&, SampleRecord& sample) {
+void add_species(Loading& loading, RecordReader&, const CocoCategory&, SampleRecord& sample) {
   if (has_neck_at_the_shoulders(sample.source) && sample.keypoints[kNeck].weight > 0.0F) {
     sample.keypoints[kNeck].weight = 0.0F;
     loading.notes.count(

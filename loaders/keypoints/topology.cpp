@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <iterator>
 #include <numeric>
 #include <sstream>
@@ -104,14 +103,6 @@ Topology animal_kingdom23() {
               "Tail_Mid_Back");
 }
 
-std::string folded(std::string_view name) {
-  const auto first = name.find_first_not_of(" \t");
-  if (first == std::string_view::npos) return {};
-  std::string result(name.substr(first, name.find_last_not_of(" \t") - first + 1));
-  for (char& c : result) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return result;
-}
-
 }  // namespace
 
 std::span<const Topology> topologies() {
@@ -126,31 +117,6 @@ const Topology& topology(std::string_view name) {
     known += (known.empty() ? "" : ", ") + each.name;
   }
   throw std::invalid_argument(fmt::format("keypoint topology: got \"{}\", expected one of {}", name, known));
-}
-
-std::vector<int> order_in_file(const Topology& topology, std::span<const std::string> names_in_file) {
-  std::vector<int> order(topology.keypoints.size(), -1);
-  for (std::size_t k = 0; k < names_in_file.size(); ++k) {
-    const std::string name = folded(names_in_file[k]);
-    const auto found = std::find_if(topology.keypoints.begin(), topology.keypoints.end(),
-                                    [&](const std::string& known) { return folded(known) == name; });
-    const auto place = static_cast<std::size_t>(found - topology.keypoints.begin());
-    if (found == topology.keypoints.end() || order[place] >= 0) {
-      throw std::invalid_argument(fmt::format(
-          "keypoint {} is named \"{}\", which {} {}", k, names_in_file[k],
-          found == topology.keypoints.end() ? "is not in the topology" : "occurs twice among the names of",
-          topology.name));
-    }
-    order[place] = static_cast<int>(k);
-  }
-  const auto missing = std::find(order.begin(), order.end(), -1);
-  if (missing != order.end()) {
-    throw std::invalid_argument(fmt::format(
-        "got {} keypoint names without \"{}\", expected the {} names of the topology {}",
-        names_in_file.size(), topology.keypoints[static_cast<std::size_t>(missing - order.begin())],
-        topology.keypoints.size(), topology.name));
-  }
-  return order;
 }
 
 manifests::Keypoints to_animal3d(const Topology& topology, std::span<const manifests::Keypoint> keypoints) {

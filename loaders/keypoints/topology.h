@@ -28,11 +28,6 @@ std::span<const Topology> topologies();
 // none.
 const Topology& topology(std::string_view name);
 
-// Returns the position of each keypoint of the topology in a file that lists its own names. The file may have
-// another order (AwA-Pose has SuperAnimal's 39 keypoints in a different one). Letter case and outer spaces
-// are ignored. Throws std::invalid_argument that names the first name that is missing or does not belong.
-std::vector<int> order_in_file(const Topology& topology, std::span<const std::string> names_in_file);
-
 // Maps a topology's own keypoints, all of them, to the 26 of Animal3D. Each weight is multiplied by the
 // topology's. A keypoint without a source gets v = 0.
 manifests::Keypoints to_animal3d(const Topology& topology, std::span<const manifests::Keypoint> keypoints);

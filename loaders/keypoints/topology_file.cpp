@@ -133,16 +133,17 @@ class Reader {
     }
   }
 
-  // Mirroring a picture before the map or after it must give the same 26.
+  // Mirroring a picture before the map or after it must give the same 26. Where only one side of the animal
+  // is labelled, one of two mirror images has no source, and nothing can differ.
   void check_mirrored_map() const {
     const Topology& animal3d = topology("animal3d26");
     for (std::size_t i = 0; i < topology_.source.size(); ++i) {
       const auto mirror = static_cast<std::size_t>(animal3d.flip[i]);
       const int here = topology_.source[i];
       const int there = topology_.source[mirror];
-      if ((here < 0 && there < 0) || (here >= 0 && topology_.flip[static_cast<std::size_t>(here)] == there)) {
-        continue;
-      }
+      if (here < 0) continue;
+      const int partner = topology_.flip[static_cast<std::size_t>(here)];
+      if (there >= 0 ? partner == there : !is_mapped_to_another(here, partner)) continue;
       const auto name = [&](int at) {
         return at < 0 ? std::string("nothing")
                       : fmt::format("\"{}\"", topology_.keypoints[static_cast<std::size_t>(at)]);
@@ -150,10 +151,15 @@ class Reader {
       fail("animal3d26",
            fmt::format("{} from {} and {} from {}", animal3d.keypoints[i], name(here),
                        animal3d.keypoints[mirror], name(there)),
-           "two keypoints that form a pair of \"flip_pairs\", one keypoint that is its own mirror image, or "
-           "none for "
-           "both");
+           "two keypoints that form a pair of \"flip_pairs\", one keypoint that is its own mirror image, or, "
+           "if only one side is labelled, nothing for the other side");
     }
+  }
+
+  // Whether the mirror image of a keypoint is mapped although it is another keypoint.
+  bool is_mapped_to_another(int keypoint, int partner) const {
+    const auto& source = topology_.source;
+    return partner != keypoint && std::find(source.begin(), source.end(), partner) != source.end();
   }
 
   const std::filesystem::path& file_;

@@ -174,6 +174,7 @@ BuildSummary build(const config::BuildConfig& config, const run::RunOptions& opt
         &config, &rules, &workspace.ingest(), &workspace.assets(), &keys, workspace.device_key()};
     publish(summary.folder, inputs, units.judgements(), units.shards());
   }
+  summary.notes = workspace.ingest().notes;
   point_latest(options.out, summary.folder);
   summary.dataset = dataset::read_dataset_manifest(summary.folder);
   summary.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

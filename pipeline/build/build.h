@@ -16,6 +16,7 @@ struct BuildSummary {
   std::filesystem::path folder;  // <out>/<name>-<key>
   double seconds = 0.0;
   bool was_up_to_date = false;
+  std::vector<candidates::IngestNote> notes;  // of reading the datasets
   std::int64_t crops_encoded = 0;  // stored crops that no earlier build had left in the output folder
 };
 

@@ -39,9 +39,13 @@ Workspace::Workspace(const config::BuildConfig& config, const run::RunOptions& o
       device_key_(config::needs_network(config) ? network::device_key(config.network) : std::string()),
       ingest_(candidates::ingest(config, digests_, network::load_body_meshes)) {
   leakage::leave_out(config, digests_, options.out, options.quiet, ingest_);
-  if (options_.quiet) return;
-  run::log_info(fmt::format("{} candidates in {} units", ingest_.candidates.size(), ingest_.units.size()));
-  for (const std::string& note : ingest_.notes) run::log_note(note);
+  if (!options_.quiet) {
+    run::log_info(fmt::format("{} candidates in {} units", ingest_.candidates.size(), ingest_.units.size()));
+  }
+  for (const candidates::IngestNote& note : ingest_.notes) {
+    const bool is_caution = note.kind == loaders::formats::NoteKind::caution;
+    if (is_caution || !options_.quiet) run::log_note(note.line());
+  }
 }
 
 device::Network& Workspace::network() {

@@ -51,8 +51,9 @@ void keep_chosen(const config::DatasetConfig& options, loaders::formats::Dataset
                     "is {}; the list belongs to other annotation files. Run `quadruped3d curate` again",
                     name, options.curation.string(), chosen.size() - seen.size(), picture));
   }
-  dataset.notes.push_back(fmt::format("curation takes {} pictures: {} of {} samples", chosen.size(),
-                                      kept.size(), dataset.records.size()));
+  dataset.notes.push_back(
+      {loaders::formats::NoteKind::remark, fmt::format("curation takes {} pictures: {} of {} samples",
+                                                       chosen.size(), kept.size(), dataset.records.size())});
   dataset.records = std::move(kept);
   dataset.files.push_back(options.curation);
 }

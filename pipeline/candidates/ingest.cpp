@@ -12,6 +12,8 @@
 #include "manifests/record_json.h"
 #include "pipeline/candidates/body_check.h"
 #include "pipeline/candidates/configured_dataset.h"
+#include "pipeline/candidates/duplicates.h"
+#include "pipeline/candidates/picture_fit.h"
 #include "pipeline/run/interrupt.h"
 
 namespace q3d::pipeline::candidates {
@@ -125,7 +127,7 @@ std::vector<std::string> check_truth(const config::DatasetConfig& options,
   if (options.body_model.empty() || !load_bodies) return std::vector<std::string>(dataset.records.size());
   const std::unique_ptr<device::BodyMeshes> bodies = load_bodies(options.body_model);
   BodyCheck check = check_bodies(*bodies, options.keypoints_3d_of_body, dataset.records);
-  dataset.notes.push_back(to_note(check));
+  dataset.notes.push_back({loaders::formats::NoteKind::remark, to_note(check)});
   return std::move(check.findings);
 }
 
@@ -138,9 +140,11 @@ std::string dataset_key(const manifests::SampleRecord& record) {
 IngestedDataset read_dataset(const config::DatasetConfig& options, manifests::DigestCache& digests) {
   run::throw_if_interrupted();
   loaders::formats::Dataset dataset = load_configured(options);
+  fit_to_pictures(options, dataset);
   for (auto& record : dataset.records) {
     record.failure_detail = without_root(std::move(record.failure_detail), options.root);
   }
+  for (auto& note : dataset.notes) note.text = without_root(std::move(note.text), options.root);
   std::string digest = digest_files(dataset.files, digests);
   return {std::move(dataset), std::move(digest)};
 }
@@ -158,10 +162,11 @@ Ingest ingest(const config::BuildConfig& config, manifests::DigestCache& digests
       result.candidates.push_back(
           {std::move(dataset.records[i]), {}, {}, options.role, std::move(findings[i])});
     }
-    for (const auto& note : dataset.notes) result.notes.push_back(name + ": " + note);
+    for (auto& note : dataset.notes) result.notes.push_back({note.kind, name, std::move(note.text)});
   }
   require_unique_ids(result.candidates);
   digest_pictures(result.candidates, digests);
+  fail_duplicates(result.candidates, result.notes);
   digests.save();
   result.units = cut_units(result.candidates, config);
   return result;

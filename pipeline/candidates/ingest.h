@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "loaders/formats/note.h"
 #include "manifests/digest.h"
 #include "manifests/sample.h"
 #include "pipeline/candidates/veto.h"
@@ -51,19 +52,29 @@ struct LeakageSummary {
   std::size_t in_groups = 0;  // pictures
 };
 
+// What a person should know of a dataset, or of the whole pool.
+struct IngestNote {
+  loaders::formats::NoteKind kind = loaders::formats::NoteKind::remark;
+  std::string dataset;  // "name/split"; empty where it concerns the pool
+  std::string text;
+
+  std::string line() const { return dataset.empty() ? text : dataset + ": " + text; }
+};
+
 struct Ingest {
   std::vector<Candidate> candidates;  // dataset order of the config, then file order
   std::vector<Unit> units;
   std::map<std::string, std::string> annotation_digests;  // "name/split" -> SHA-256 of its annotation files
-  std::vector<std::string> notes;                         // what the loaders want a person to know
+  std::vector<IngestNote> notes;
 
   // Set by leave_out (pipeline/leakage/exclusions.h).
   std::optional<Veto> veto;
   std::optional<LeakageSummary> leakage;
 };
 
-// Loads every dataset and digests every picture (in parallel; unchanged files come from the cache). A record
-// whose role asks for a body and that gives no pose is failed. Throws std::runtime_error for an
+// Loads every dataset, compares the labels with the pictures' headers, and digests every picture (in
+// parallel; unchanged files come from the cache). A record whose role asks for a body and that gives no pose
+// is failed, and so is one that repeats an earlier one (duplicates.h). Throws std::runtime_error for an
 // annotation file that cannot be read, manifests::IoError for a picture or mask that is there and cannot be
 // read, and Interrupted. `load_bodies` is called for datasets with a body model;
 // an empty one leaves their bodies unchecked, for callers that look at pictures alone.
@@ -73,8 +84,8 @@ Ingest ingest(const config::BuildConfig& config, manifests::DigestCache& digests
 // Returns a dataset's name and split as one word, "name/split": the key of whatever is listed by dataset.
 std::string dataset_key(const manifests::SampleRecord& record);
 
-// One dataset as ingest reads it: the chosen records where it is curated, without this machine's paths, and
-// the digest of its annotation files and that choice.
+// One dataset as ingest reads it: the chosen records where it is curated, compared with their pictures
+// (picture_fit.h), without this machine's paths, and the digest of its annotation files and that choice.
 struct IngestedDataset {
   loaders::formats::Dataset dataset;
   std::string annotations_sha256;

@@ -69,6 +69,7 @@ nlohmann::ordered_json to_json(const build::BuildSummary& summary) {
           {"dataset", summary.folder.string()},
           {"content_id", summary.dataset.content_id},
           {"reasons", to_json(summary.dataset.reasons)},
+          {"notes", dataset::notes_json(summary.notes)},
           {"up_to_date", summary.was_up_to_date},
           {"crops_encoded", summary.crops_encoded},
           {"seconds", summary.seconds}};

@@ -45,6 +45,11 @@ void read_own_labels(JsonFields& fields, DatasetConfig& dataset) {
                         setting.key, dataset.format));
   }
   if (is_own) read_settings(fields, own_label_settings(), dataset);
+  require(dataset.categories.empty() || dataset.format == "coco", fields.where(),
+          "\"categories\" belongs to the format \"coco\"; DeepLabCut's files have none");
+  require(
+      !dataset.first_frame || dataset.format == "deeplabcut", fields.where(),
+      "\"first_frame\" belongs to the format \"deeplabcut\", whose predictions number the frames of a video");
 }
 
 DatasetConfig parse_dataset(const json& object, const std::string& where) {

@@ -32,6 +32,8 @@ struct DatasetConfig : loaders::formats::DatasetOptions {
   std::string licence{};
   std::string source_url{};
   std::string citation{};
+  bool turns_by_exif = false;         // the labels were made on the pictures as EXIF turns them
+  bool scales_resized = false;        // labels of pictures that were resized since are scaled with them
 };
 
 struct NetworkConfig {

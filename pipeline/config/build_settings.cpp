@@ -30,6 +30,16 @@ Word<DatasetConfig> keypoints_3d_word() {
       [](DatasetConfig& dataset, const std::string& word) { dataset.keypoints_3d_of_body = word == "body"; }};
 }
 
+Word<DatasetConfig> orientation_word() {
+  return {[](const DatasetConfig& dataset) { return dataset.turns_by_exif ? "exif" : "stored"; },
+          [](DatasetConfig& dataset, const std::string& word) { dataset.turns_by_exif = word == "exif"; }};
+}
+
+Word<DatasetConfig> resized_word() {
+  return {[](const DatasetConfig& dataset) { return dataset.scales_resized ? "scale" : "refuse"; },
+          [](DatasetConfig& dataset, const std::string& word) { dataset.scales_resized = word == "scale"; }};
+}
+
 }  // namespace
 
 const Settings<BuildConfig>& build_settings() {
@@ -87,6 +97,18 @@ const Settings<DatasetConfig>& dataset_settings() {
        .member = &DatasetConfig::images,
        .description =
            "folder of the pictures, relative to `root`. See docs/datasets.md for each format's default"},
+      {.key = "orientation",
+       .member = orientation_word(),
+       .description =
+           "`stored` takes labels for the pixels as they are stored; `exif` takes them for the pictures as "
+           "their EXIF orientation turns them, and turns the pictures. See docs/own-labels.md",
+       .words = {"stored", "exif"}},
+      {.key = "resized",
+       .member = resized_word(),
+       .description =
+           "what happens to labels whose file states another size than the picture has: `refuse` fails them "
+           "as `size_mismatch`; `scale` scales box and keypoints if width and height differ by one factor",
+       .words = {"refuse", "scale"}},
       {.key = "curation",
        .member = &DatasetConfig::curation,
        .description =
@@ -123,6 +145,17 @@ const Settings<DatasetConfig>& own_label_settings() {
        .member = &DatasetConfig::topology,
        .description = "a file that describes the keypoints. See docs/own-labels.md",
        .is_required = true},
+      {.key = "categories",
+       .member = &DatasetConfig::categories,
+       .description =
+           "`coco` only: names of the file's categories to take. Annotations of the others are left out"},
+      {.key = "first_frame",
+       .member = &DatasetConfig::first_frame,
+       .description =
+           "`deeplabcut` only, for predictions of a video: the number of the picture that shows frame 0 (1 "
+           "for "
+           "pictures that ffmpeg numbered). Without it the pictures must have the frames' own numbers",
+       .range = {.least = 0}},
       {.key = "species",
        .member = &DatasetConfig::species,
        .description =

@@ -45,8 +45,8 @@ template <typename Struct>
 struct Setting {
   using Member =
       std::variant<bool Struct::*, int Struct::*, std::uint64_t Struct::*, double Struct::*,
-                   std::optional<double> Struct::*, std::string Struct::*, std::filesystem::path Struct::*,
-                   std::vector<std::string> Struct::*, Word<Struct>>;
+                   std::optional<double> Struct::*, std::optional<int> Struct::*, std::string Struct::*,
+                   std::filesystem::path Struct::*, std::vector<std::string> Struct::*, Word<Struct>>;
   const char* key;
   Member member;
   const char* description;  // Markdown; a sentence or more, without the range and the default
@@ -76,7 +76,7 @@ void check_range(const Range& range, double value, const std::string& key, const
 void check_words(const std::vector<std::string>& words, const nlohmann::ordered_json& value,
                  const std::string& where);
 
-// The value as the config file writes it; null for an absent number and an empty path.
+// The value as the config file writes it; null for an absent number, an empty path and an empty list.
 template <typename Struct>
 nlohmann::ordered_json value_of(const Setting<Struct>& setting, const Struct& config) {
   return std::visit(
@@ -87,7 +87,11 @@ nlohmann::ordered_json value_of(const Setting<Struct>& setting, const Struct& co
         } else if constexpr (std::is_same_v<Member, std::filesystem::path Struct::*>) {
           const std::filesystem::path& path = config.*member;
           return path.empty() ? nlohmann::ordered_json() : nlohmann::ordered_json(path.string());
-        } else if constexpr (std::is_same_v<Member, std::optional<double> Struct::*>) {
+        } else if constexpr (std::is_same_v<Member, std::vector<std::string> Struct::*>) {
+          const std::vector<std::string>& texts = config.*member;
+          return texts.empty() ? nlohmann::ordered_json() : nlohmann::ordered_json(texts);
+        } else if constexpr (std::is_same_v<Member, std::optional<double> Struct::*> ||
+                             std::is_same_v<Member, std::optional<int> Struct::*>) {
           const auto& number = config.*member;
           return number ? nlohmann::ordered_json(*number) : nlohmann::ordered_json();
         } else {
@@ -159,6 +163,7 @@ std::vector<SettingFacts> facts_of(const Settings<Struct>& settings) {
           using Member = std::decay_t<decltype(member)>;
           if constexpr (std::is_same_v<Member, bool Struct::*>) return "boolean";
           if constexpr (std::is_same_v<Member, int Struct::*> ||
+                        std::is_same_v<Member, std::optional<int> Struct::*> ||
                         std::is_same_v<Member, std::uint64_t Struct::*>) {
             return "integer";
           }

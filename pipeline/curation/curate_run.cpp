@@ -92,7 +92,7 @@ std::vector<CuratedPicture> read_pictures(const CurationConfig& config, Inputs& 
     for (const auto& file : dataset.files) {
       inputs.digests[name + " " + file.filename().string()] = manifests::sha256_file(file);
     }
-    for (const std::string& note : dataset.notes) inputs.notes.push_back(name + ": " + note);
+    for (const auto& note : dataset.notes) inputs.notes.push_back(name + ": " + note.text);
     add_pictures(dataset, pictures);
   }
   for (CuratedPicture& picture : pictures) complete(config, labels, picture);

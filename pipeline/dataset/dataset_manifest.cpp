@@ -212,6 +212,16 @@ std::string content_id(const std::vector<ShardEntry>& shards) {
   return manifests::sha256(text);
 }
 
+ordered_json notes_json(const std::vector<candidates::IngestNote>& notes) {
+  ordered_json list = ordered_json::array();
+  for (const candidates::IngestNote& note : notes) {
+    list.push_back({{"kind", loaders::formats::to_string(note.kind)},
+                    {"dataset", text_or_null(note.dataset)},
+                    {"text", note.text}});
+  }
+  return list;
+}
+
 std::string dataset_json(const DatasetInputs& inputs, const std::vector<manifests::Judgement>& judgements,
                          const std::vector<ShardEntry>& shards, const std::string& verdicts_sha256) {
   Counts counts;
@@ -239,6 +249,7 @@ std::string dataset_json(const DatasetInputs& inputs, const std::vector<manifest
                                  {"thresholds", describe_thresholds(inputs)},
                                  {"guards", describe_guards(inputs)},
                                  {"statistics", statistics(*inputs.ingest, judgements)},
+                                 {"notes", notes_json(inputs.ingest->notes)},
                                  {"provenance",
                                   {{"config", inputs.config->as_written},
                                    {"annotations", inputs.ingest->annotation_digests},

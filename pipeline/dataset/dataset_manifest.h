@@ -2,6 +2,8 @@
 // became of every candidate).
 #pragma once
 
+#include <nlohmann/json_fwd.hpp>
+
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -89,6 +91,9 @@ struct DatasetInputs {
   const stages::StageKeys* keys = nullptr;
   std::string device_key;
 };
+
+// A list of {kind, dataset, text}; `dataset` is null where a note concerns the whole pool.
+nlohmann::ordered_json notes_json(const std::vector<candidates::IngestNote>& notes);
 
 // Text of dataset.json: no time, host or absolute path of its own, so equal builds give equal bytes.
 std::string dataset_json(const DatasetInputs& inputs, const std::vector<manifests::Judgement>& judgements,

@@ -138,6 +138,8 @@ std::string_view sentence(Reason reason) {
       return "The annotation's box has no width or no height.";
     case Reason::box_outside_image:
       return "The annotation's box does not touch the picture.";
+    case Reason::box_too_small:
+      return "The annotation's box is only a few pixels wide and high.";
     case Reason::keypoints_missing:
       return "The annotation has no keypoints.";
     case Reason::keypoints_wrong_length:
@@ -146,6 +148,10 @@ std::string_view sentence(Reason reason) {
       return "A coordinate of the annotated keypoints is not finite.";
     case Reason::no_visible_keypoints:
       return "No annotated keypoint is visible, so there is nothing to compare a label with.";
+    case Reason::keypoints_outside:
+      return "Most annotated keypoints lie outside the picture or outside their box.";
+    case Reason::not_in_pixels:
+      return "The annotation gives fractions of the picture's size where pixels are expected.";
     case Reason::record_malformed:
       return "A field of the annotation has the wrong form.";
     case Reason::image_not_listed:
@@ -154,6 +160,8 @@ std::string_view sentence(Reason reason) {
       return "The label should come from the annotation file, but the annotation has no pose.";
     case Reason::not_a_quadruped:
       return "The body model cannot show an animal of this species.";
+    case Reason::duplicate:
+      return "An earlier candidate has the same picture and the same keypoints.";
     case Reason::image_missing:
       return "The picture was not found.";
     case Reason::image_empty:
@@ -168,6 +176,9 @@ std::string_view sentence(Reason reason) {
       return "The picture is larger than this program accepts.";
     case Reason::path_escapes_root:
       return "The picture's path leads out of the dataset's folder.";
+    case Reason::size_mismatch:
+      return "The picture does not have the size that the annotation file states, so the labels do not fit "
+             "it.";
     case Reason::prediction_not_finite:
       return "The network gave a number that is not finite.";
     case Reason::error_too_large:

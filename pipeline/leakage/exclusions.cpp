@@ -27,18 +27,20 @@ void leave_out_leaks(const config::BuildConfig& config, manifests::DigestCache& 
                                        to_string(leak.evidence), leak.detail)};
     ++report.summary.excluded;
   }
-  ingest.notes.insert(ingest.notes.end(), report.notes.begin(), report.notes.end());
-  ingest.notes.push_back(
-      fmt::format("leakage: {} pseudo labels are left out, since their picture is in a test set",
-                  report.summary.excluded));
+  const auto note = [&](std::string text) {
+    ingest.notes.push_back({loaders::formats::NoteKind::remark, {}, std::move(text)});
+  };
+  for (const std::string& text : report.notes) note(text);
+  note(fmt::format("leakage: {} pseudo labels are left out, since their picture is in a test set",
+                   report.summary.excluded));
   if (others > 0) {
-    ingest.notes.push_back(fmt::format(
+    note(fmt::format(
         "leakage: {} samples that bring their own labels have a picture of a test set too, and are kept "
         "(leaks.csv in the output folder lists them)",
         others));
   }
   if (report.summary.groups > 0) {
-    ingest.notes.push_back(
+    note(
         fmt::format("leakage: {} pictures of the pool look like another, in {} groups, and are kept "
                     "(duplicates.csv in the output folder lists them)",
                     report.summary.in_groups, report.summary.groups));
@@ -57,9 +59,11 @@ void apply_veto(const std::filesystem::path& file, candidates::Ingest& ingest) {
     ++veto.matched;
   }
   if (veto.matched < veto.reasons.size()) {
-    ingest.notes.push_back(fmt::format("veto {}: {} of its {} ids are no candidate's",
-                                       file.filename().string(), veto.reasons.size() - veto.matched,
-                                       veto.reasons.size()));
+    ingest.notes.push_back(
+        {loaders::formats::NoteKind::caution,
+         {},
+         fmt::format("veto {}: {} of its {} ids are no candidate's", file.filename().string(),
+                     veto.reasons.size() - veto.matched, veto.reasons.size())});
   }
 }
 

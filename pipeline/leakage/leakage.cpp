@@ -27,8 +27,11 @@ struct Picture {
   std::string id;          // of that
   std::string path;
   std::string sha256;
+  int orientation = 1;  // by which its dataset turns it
   std::string origin;
   std::vector<std::size_t> elsewhere;  // the first sample of each other file of the same content
+
+  PictureFile file() const { return {path, sha256, orientation}; }
 };
 
 struct Pictures {
@@ -39,7 +42,7 @@ struct Pictures {
   // Returns its place. The first sample of a picture gives its id, and a later one an origin it lacks.
   std::size_t add(std::size_t sample, const SampleRecord& record, const std::string& sha256) {
     const auto [found, is_new] = of_sha256.emplace(sha256, list.size());
-    if (is_new) list.push_back({sample, record.id, record.image_path, sha256, {}, {}});
+    if (is_new) list.push_back({sample, record.id, record.image_path, sha256, record.orientation, {}, {}});
     Picture& picture = list[found->second];
     if (record.image_path != picture.path && other_paths.insert(record.image_path).second) {
       picture.elsewhere.push_back(sample);
@@ -50,7 +53,7 @@ struct Pictures {
 
   std::vector<PictureFile> files() const {
     std::vector<PictureFile> files;
-    for (const Picture& picture : list) files.push_back({picture.path, picture.sha256});
+    for (const Picture& picture : list) files.push_back(picture.file());
     return files;
   }
 };
@@ -91,7 +94,7 @@ struct HashedPictures {
 
   HashedPictures(const Pictures& pictures, const PictureHashes& known) {
     for (std::size_t i = 0; i < pictures.list.size(); ++i) {
-      const auto hash = known.find(pictures.list[i].sha256);
+      const auto hash = known.find(pictures.list[i].file().key());
       if (!hash) continue;
       hashes.push_back(*hash);
       places.push_back(i);

@@ -33,7 +33,7 @@ LeakageRunSummary run_leakage(const config::BuildConfig& config, const run::RunO
   summary.leaks_by_evidence = count_by_evidence(report);
   summary.groups = report.groups.size();
   summary.pictures_in_groups = report.summary.in_groups;
-  summary.notes = pool.notes;
+  for (const candidates::IngestNote& note : pool.notes) summary.notes.push_back(note.line());
   summary.notes.insert(summary.notes.end(), report.notes.begin(), report.notes.end());
   summary.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return summary;

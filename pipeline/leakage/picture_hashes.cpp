@@ -11,6 +11,7 @@
 #include <string_view>
 
 #include "loaders/pictures/image.h"
+#include "loaders/pictures/orientation.h"
 #include "loaders/pictures/perceptual_hash.h"
 #include "manifests/atomic_file.h"
 #include "manifests/checked_line.h"
@@ -30,10 +31,10 @@ constexpr std::size_t kBlock = 4096;  // pictures between two writes of the file
 constexpr std::size_t kShaDigits = 64;
 constexpr std::size_t kHashDigits = 16;
 
-// "dct1 <sha256> <upright> <mirrored>", or "dct1 <sha256> -" for a picture without a hash.
-std::string line_of(const std::string& sha256, const std::optional<PictureHash>& hash) {
-  if (!hash) return fmt::format("{} {} -", kMethod, sha256);
-  return fmt::format("{} {} {:016x} {:016x}", kMethod, sha256, hash->upright, hash->mirrored);
+// "dct1 <key> <upright> <mirrored>", or "dct1 <key> -" for a picture without a hash.
+std::string line_of(const std::string& key, const std::optional<PictureHash>& hash) {
+  if (!hash) return fmt::format("{} {} -", kMethod, key);
+  return fmt::format("{} {} {:016x} {:016x}", kMethod, key, hash->upright, hash->mirrored);
 }
 
 bool parse_hash(std::string_view digits, std::uint64_t& hash) {
@@ -41,17 +42,22 @@ bool parse_hash(std::string_view digits, std::uint64_t& hash) {
   return error == std::errc() && end == digits.data() + digits.size();
 }
 
-std::optional<PictureHash> hash_file(const std::string& path) {
-  const loaders::pictures::DecodedImage image = loaders::pictures::decode_image(std::filesystem::path(path));
+std::optional<PictureHash> hash_file(const PictureFile& picture) {
+  const loaders::pictures::DecodedImage image =
+      loaders::pictures::decode_image(std::filesystem::path(picture.path));
   if (image.failure == manifests::Reason::image_missing) {  // it was there when it was digested
     throw std::runtime_error(
         fmt::format("{}: it could be read before and cannot now; put it back and run again", image.detail));
   }
   if (image.failure != manifests::Reason::none) return std::nullopt;
-  return loaders::pictures::perceptual_hash(image.rgb);
+  return loaders::pictures::perceptual_hash(loaders::pictures::turned(image.rgb, picture.orientation));
 }
 
 }  // namespace
+
+std::string PictureFile::key() const {
+  return orientation == 1 ? sha256 : fmt::format("{}o{}", sha256, orientation);
+}
 
 PictureHashes::PictureHashes(std::filesystem::path file) : file_(std::move(file)) {
   if (!std::filesystem::exists(file_)) return;
@@ -63,24 +69,27 @@ PictureHashes::PictureHashes(std::filesystem::path file) : file_(std::move(file)
     const auto payload = manifests::open_line(rest.substr(0, end));
     rest.remove_prefix(std::min(end + 1, rest.size()));
     if (!payload || !payload->starts_with(kMethod) || payload->size() < prefix + kShaDigits + 2) continue;
-    const std::string sha256(payload->substr(prefix, kShaDigits));
-    const std::string_view hashes = payload->substr(prefix + kShaDigits + 1);
+    const std::size_t key_end = payload->find(' ', prefix);
+    if (key_end == std::string_view::npos || key_end - prefix < kShaDigits) continue;
+    const std::string key(payload->substr(prefix, key_end - prefix));
+    const std::string_view hashes = payload->substr(key_end + 1);
     PictureHash hash;
     if (hashes == "-") {
-      hashes_[sha256] = std::nullopt;
+      hashes_[key] = std::nullopt;
     } else if (hashes.size() == 2 * kHashDigits + 1 &&
                parse_hash(hashes.substr(0, kHashDigits), hash.upright) &&
                parse_hash(hashes.substr(kHashDigits + 1), hash.mirrored)) {
-      hashes_[sha256] = hash;
+      hashes_[key] = hash;
     }
   }
 }
 
 void PictureHashes::add(const std::vector<PictureFile>& pictures, bool quiet) {
   std::vector<const PictureFile*> fresh;
-  std::set<std::string_view> seen;
+  std::set<std::string> seen;
   for (const PictureFile& picture : pictures) {
-    if (hashes_.count(picture.sha256) == 0 && seen.insert(picture.sha256).second) fresh.push_back(&picture);
+    const std::string key = picture.key();
+    if (hashes_.count(key) == 0 && seen.insert(key).second) fresh.push_back(&picture);
   }
   if (fresh.empty()) return;
   run::Progress progress("pictures hashed", static_cast<std::int64_t>(fresh.size()), quiet);
@@ -91,17 +100,17 @@ void PictureHashes::add(const std::vector<PictureFile>& pictures, bool quiet) {
     std::vector<std::optional<PictureHash>> made(block.size());
     tbb::parallel_for(std::size_t{0}, block.size(), [&](std::size_t i) {
       if (run::interrupted()) return;
-      made[i] = hash_file(block[i]->path);
+      made[i] = hash_file(*block[i]);
       progress.advance(1);
     });
     run::throw_if_interrupted();
-    for (std::size_t i = 0; i < block.size(); ++i) hashes_[block[i]->sha256] = made[i];
+    for (std::size_t i = 0; i < block.size(); ++i) hashes_[block[i]->key()] = made[i];
     append(block);
   }
 }
 
-std::optional<PictureHash> PictureHashes::find(const std::string& sha256) const {
-  const auto found = hashes_.find(sha256);
+std::optional<PictureHash> PictureHashes::find(const std::string& key) const {
+  const auto found = hashes_.find(key);
   return found == hashes_.end() ? std::nullopt : found->second;
 }
 
@@ -110,7 +119,7 @@ std::optional<PictureHash> PictureHashes::find(const std::string& sha256) const 
 void PictureHashes::append(const std::vector<const PictureFile*>& pictures) const {
   std::string lines;
   for (const PictureFile* picture : pictures) {
-    lines += manifests::seal_line(line_of(picture->sha256, hashes_.at(picture->sha256)));
+    lines += manifests::seal_line(line_of(picture->key(), hashes_.at(picture->key())));
   }
   std::ofstream stream(file_, std::ios::app | std::ios::binary);
   stream << lines << std::flush;

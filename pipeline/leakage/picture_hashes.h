@@ -14,9 +14,13 @@ namespace q3d::pipeline::leakage {
 struct PictureFile {
   std::string path;
   std::string sha256;
+  int orientation = 1;  // EXIF's, by which the dataset turns the picture
+
+  // What its hash is remembered by: the SHA-256, and the orientation if it turns the picture.
+  std::string key() const;
 };
 
-// Remembers hashes by the pictures' SHA-256 in one file of checked lines, which grows as pictures are hashed:
+// Remembers hashes by the pictures' keys in one file of checked lines, which grows as pictures are hashed:
 // a run that is stopped loses the last few thousand at most.
 class PictureHashes {
  public:
@@ -28,13 +32,13 @@ class PictureHashes {
   // manifests::IoError for one that cannot be read, Interrupted.
   void add(const std::vector<PictureFile>& pictures, bool quiet);
 
-  std::optional<manifests::PictureHash> find(const std::string& sha256) const;
+  std::optional<manifests::PictureHash> find(const std::string& key) const;
 
  private:
   void append(const std::vector<const PictureFile*>& pictures) const;
 
   std::filesystem::path file_;
-  std::map<std::string, std::optional<manifests::PictureHash>> hashes_;  // by SHA-256
+  std::map<std::string, std::optional<manifests::PictureHash>> hashes_;  // by key
 };
 
 }  // namespace q3d::pipeline::leakage

@@ -3,11 +3,14 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
+#include <cmath>
+#include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
 #include "loaders/pictures/box.h"
 #include "loaders/pictures/crop.h"
 #include "loaders/pictures/image.h"
+#include "loaders/pictures/orientation.h"
 #include "loaders/pictures/stored_crop.h"
 #include "pipeline/run/interrupt.h"
 
@@ -19,6 +22,32 @@ using manifests::Reason;
 // As in the official evaluator, the area is the sum of the warped mask / 255.
 double area_px(const cv::Mat& mask) {
   return cv::sum(mask)[0] / 255.0;
+}
+
+// Turns a mask of the stored pixels' size as the picture was turned, and scales one of the size before the
+// picture was resized. A mask of the picture's own size is returned as it is, and so is one that fits
+// neither.
+cv::Mat fitted_mask(const cv::Mat& mask, const manifests::SampleRecord& record, const cv::Size& size) {
+  if (mask.empty() || mask.size() == size) return mask;
+  const bool lies_on_its_side = loaders::pictures::exchanges_sides(record.orientation) &&
+                                mask.cols * size.width == mask.rows * size.height;
+  const cv::Mat upright = lies_on_its_side ? loaders::pictures::turned(mask, record.orientation) : mask;
+  if (upright.size() == size || record.scale == 1.0) return upright;
+  const bool has_old_size = std::abs(upright.cols * record.scale - size.width) <= 1.0 &&
+                            std::abs(upright.rows * record.scale - size.height) <= 1.0;
+  if (!has_old_size) return upright;
+  cv::Mat scaled;
+  cv::resize(upright, scaled, size, 0, 0, record.scale < 1.0 ? cv::INTER_AREA : cv::INTER_LINEAR);
+  return scaled;
+}
+
+// Appends how the picture or its labels were changed, so that a label's way can be followed back.
+void add_provenance(const manifests::SampleRecord& record, std::string& detail) {
+  const auto add = [&](const std::string& text) { detail += (detail.empty() ? "" : "; ") + text; };
+  if (record.orientation != 1) {
+    add(fmt::format("the picture is turned by its EXIF orientation, {}", record.orientation));
+  }
+  if (record.scale != 1.0) add(fmt::format("box and keypoints are scaled by {:.6g}", record.scale));
 }
 
 // A picture that had a digest and is gone now (an unmounted disk) is no failed sample: it stops the run.
@@ -34,20 +63,23 @@ void require_present(const candidates::Candidate& candidate, const DecodedSample
 DecodedSample decode_sample(const manifests::SampleRecord& record, Wanted want,
                             const config::ShardConfig& shards) {
   DecodedSample sample;
-  const loaders::pictures::DecodedImage image = loaders::pictures::decode_image(record.image_path);
+  loaders::pictures::DecodedImage image = loaders::pictures::decode_image(record.image_path);
   if (image.failure != Reason::none) {
     sample.failure = image.failure;
     sample.detail = image.detail;
     return sample;
   }
+  image.rgb = loaders::pictures::turned(image.rgb, record.orientation);
   // A sample whose mask is absent, unreadable or no silhouette has none. If a file is named, the detail says
   // what is wrong with it.
-  const loaders::pictures::DecodedMask mask = loaders::pictures::decode_mask(record.mask_path);
+  loaders::pictures::DecodedMask mask = loaders::pictures::decode_mask(record.mask_path);
+  mask.silhouette = fitted_mask(mask.silhouette, record, image.rgb.size());
   const bool has_mask = mask.silhouette.size() == image.rgb.size();
   if (!has_mask && mask.kind != loaders::pictures::MaskKind::absent) {
     sample.detail =
         "the mask is left out: " + (mask.detail.empty() ? "it is not of the picture's size" : mask.detail);
   }
+  add_provenance(record, sample.detail);
   sample.image_width_px = image.rgb.cols;
   sample.image_height_px = image.rgb.rows;
   sample.has_mask = has_mask;

@@ -12,6 +12,7 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <string_view>
 
 #include "smal/tensors/safetensors_header.h"
 
@@ -26,6 +27,21 @@ constexpr std::uint64_t kMaxHeaderBytes = 100'000'000;  // the format's own limi
 
 std::string system_reason() {
   return std::strerror(errno);
+}
+
+// Says what the file is if it holds weights in another form, and how they are imported; else "".
+std::string other_form(std::string_view content) {
+  constexpr const char* kImport =
+      "got {}, expected safetensors: import it with tools/import_assets.py (docs/assets.md)";
+  if (content.starts_with("PK\3\4")) {
+    return fmt::format(fmt::runtime(kImport), "a PyTorch file, such as a Lightning checkpoint (.ckpt)");
+  }
+  if (content.starts_with("\x80")) {
+    const bool has_header = content.size() > kLengthBytes && content[kLengthBytes] == '{';
+    if (!has_header) return fmt::format(fmt::runtime(kImport), "a Python pickle (.pkl, .pt, .pth)");
+  }
+  if (content.starts_with("version https://git-lfs")) return "got a Git LFS pointer: run `git lfs pull`";
+  return {};
 }
 
 class FileDescriptor {
@@ -76,6 +92,9 @@ struct SafeTensors::Mapping {
   }
 
   void read_header() {
+    if (const std::string other = other_form({bytes, static_cast<std::size_t>(size)}); !other.empty()) {
+      throw std::runtime_error(other);
+    }
     std::uint64_t header_bytes = 0;
     std::memcpy(&header_bytes, bytes, kLengthBytes);
     if (header_bytes > kMaxHeaderBytes) {

@@ -131,9 +131,9 @@ class Folder {
   q3d::testing::ScratchDir scratch_;
 };
 
-inline std::string joined(const std::vector<std::string>& notes) {
+inline std::string joined(const std::vector<Note>& notes) {
   std::string text;
-  for (const auto& note : notes) text += note + "\n";
+  for (const Note& note : notes) text += note.text + "\n";
   return text;
 }
 

@@ -55,7 +55,7 @@ TEST(Prima, reads_every_field) {
   EXPECT_EQ(record.truth->betas[40], 0.3F);
   EXPECT_EQ(record.truth->trans[2], 5.0F);
   EXPECT_EQ(record.truth->keypoints_3d[77], 1.0F);
-  EXPECT_EQ(dataset.notes, std::vector<std::string>());
+  EXPECT_EQ(joined(dataset.notes), "");
 }
 
 TEST(Prima, a_record_of_2d_alone_has_no_truth) {
@@ -186,11 +186,12 @@ TEST(Load, a_file_that_cannot_be_read_names_itself_the_place_and_what_was_expect
   EXPECT_THAT(cut, HasSubstr("line "));
   EXPECT_THAT(cut, HasSubstr("byte "));
   EXPECT_THAT(cut, HasSubstr("cut short"));
-  EXPECT_THAT(thrown_by(folder, "prima", ""), HasSubstr("cut short"));
+  EXPECT_THAT(thrown_by(folder, "prima", ""), HasSubstr("got an empty file (0 bytes)"));
   EXPECT_LT(thrown_by(folder, "prima", "{\"data\": \"" + std::string(100'000, 'x')).size(), 800U);
   EXPECT_THAT(thrown_by(folder, "prima", "version https://git-lfs.github.com/spec/v1\n"),
               HasSubstr("git lfs pull"));
-  EXPECT_THAT(thrown_by(folder, "prima", "<html>quota</html>"), HasSubstr("line 1, byte 1"));
+  EXPECT_THAT(thrown_by(folder, "prima", "<html>quota</html>"), HasSubstr("got an HTML page"));
+  EXPECT_THAT(thrown_by(folder, "prima", "{\"data\": nothing}"), HasSubstr("line 1, byte 11"));
   EXPECT_THAT(thrown_by(folder, "prima", "[1, 2]"),
               HasSubstr("got 2 values, expected an object with an array \"data\""));
   EXPECT_THAT(thrown_by(folder, "prima", R"({"data": {"a": 1}})"),
@@ -298,8 +299,9 @@ INSTANTIATE_TEST_SUITE_P(
         Break{"bbox", "[8,8,0,26]", Reason::box_zero_size},
         Break{"bbox", "[8,8,36,-1]", Reason::box_zero_size},
         Break{"bbox", "[64,8,5,5]", Reason::box_outside_image},
-        Break{"bbox", "[-9,8,5,5]", Reason::box_outside_image}, Break{"width", "0", Reason::record_malformed},
-        Break{"width", "\"64\"", Reason::record_malformed}, Break{"height", "1e12", Reason::record_malformed},
+        Break{"bbox", "[-9,8,5,5]", Reason::box_outside_image},
+        Break{"width", "\"wide\"", Reason::record_malformed},
+        Break{"width", "[64]", Reason::record_malformed}, Break{"height", "1e12", Reason::record_malformed},
         Break{"height", "1.5", Reason::record_malformed},
         Break{"keypoint_2d", "null", Reason::keypoints_missing},
         Break{"keypoint_2d", "[]", Reason::keypoints_wrong_length},
@@ -373,7 +375,9 @@ TEST_P(BrokenSuperAnimal, fails_alone_and_says_why) {
 INSTANTIATE_TEST_SUITE_P(Fields, BrokenSuperAnimal,
                          ::testing::Values(Break{"image_id", "null", Reason::image_not_listed},
                                            Break{"image_id", "99999", Reason::image_not_listed},
-                                           Break{"image_id", "\"101\"", Reason::record_malformed},
+                                           Break{"image_id", "\"99999\"", Reason::image_not_listed},
+                                           Break{"image_id", "true", Reason::record_malformed},
+                                           Break{"image_id", "1.5", Reason::record_malformed},
                                            Break{"bbox", "null", Reason::box_missing},
                                            Break{"bbox", "[]", Reason::record_malformed},
                                            Break{"bbox", "[1,2,3,NaN]", Reason::box_not_finite},

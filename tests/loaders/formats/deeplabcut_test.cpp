@@ -177,30 +177,6 @@ TEST(DeepLabCut, a_picture_in_two_rows_is_told_apart_by_number) {
   EXPECT_EQ(dataset.records[1].id, "lab/train/labeled-data/walk/img000.png#1");
 }
 
-std::string csv_refusal(const std::string& text) {
-  const q3d::testing::ScratchDir scratch;
-  write_text(scratch.path() / "labels.csv", text);
-  try {
-    read_label_table(scratch.path() / "labels.csv");
-  } catch (const std::runtime_error& error) {
-    return error.what();
-  }
-  return "";
-}
-
-TEST(LabelCsv, names_line_and_cell_of_what_it_cannot_read) {
-  const std::string header = "scorer,A,A\nbodyparts,snout,snout\ncoords,x,y\n";
-  EXPECT_EQ(csv_refusal(header), "");
-  EXPECT_EQ(csv_refusal(header + "a.png,1,\n"), "");
-  EXPECT_THAT(csv_refusal(""), HasSubstr("got a header of 0 rows"));
-  EXPECT_THAT(csv_refusal("a,b\n1,2\n"), HasSubstr("got a header of 0 rows"));
-  EXPECT_THAT(csv_refusal("scorer,A\nbodyparts,snout,snout\n"), HasSubstr("line 2: got 3 cells, expected 2"));
-  EXPECT_THAT(csv_refusal(header + "a.png,1,left\n"), HasSubstr("line 4: got \"left\" for y of snout"));
-  EXPECT_THAT(csv_refusal(header + "a.png,1\n"), HasSubstr("line 4: got 2 cells, expected 3"));
-  EXPECT_THAT(csv_refusal(header + "\"a.png,1,2\n"), HasSubstr("a quote that is not closed"));
-  EXPECT_THAT(csv_refusal("scorer,A,A\nbodyparts,snout,snout\ncoords,x,z\n"), HasSubstr("coords: got \"z\""));
-}
-
 TEST(LabelHdf5, refuses_what_is_no_frame) {
   const q3d::testing::ScratchDir scratch;
   const std::string whole = [] {

@@ -153,11 +153,23 @@ TEST(TopologyFile, a_map_that_mixes_left_and_right_is_refused) {
   document["animal3d26"]["left_eye"] = "snout";
   EXPECT_THAT(refusal(document), HasSubstr("left_eye from \"snout\" and right_eye from \"eye_r\""));
   document = good_file();
-  document["animal3d26"].erase("right_eye");
-  EXPECT_THAT(refusal(document), HasSubstr("left_eye from \"eye_l\" and right_eye from nothing"));
-  document = good_file();
   document["flip_pairs"] = json::array();
   EXPECT_THAT(refusal(document), HasSubstr("left_eye from \"eye_l\""));
+  document = good_file();
+  document["animal3d26"].erase("right_eye");
+  document["animal3d26"]["right_ear"] = "eye_r";
+  EXPECT_THAT(refusal(document), HasSubstr("left_eye from \"eye_l\" and right_eye from nothing"));
+}
+
+TEST(TopologyFile, one_side_alone_may_be_mapped) {
+  json document = good_file();
+  document["animal3d26"].erase("right_eye");
+  EXPECT_EQ(refusal(document), "");
+  document["keypoints"] = {"eye_l", "snout"};
+  document["flip_pairs"] = json::array();
+  EXPECT_EQ(refusal(document), "");
+  document["animal3d26"]["right_eye"] = "eye_l";
+  EXPECT_EQ(refusal(document), "") << "one keypoint that is its own mirror image";
 }
 
 }  // namespace

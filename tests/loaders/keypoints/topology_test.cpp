@@ -83,40 +83,6 @@ TEST(Topology, unknown_name_lists_the_known) {
   }
 }
 
-TEST(OrderInFile, follows_names_not_positions) {
-  const Topology& kingdom = topology("animal_kingdom23");
-  std::vector<std::string> names = kingdom.keypoints;
-  std::reverse(names.begin(), names.end());
-  names[0] += " ";  // the real files have "Ankle_Left "
-  const std::vector<int> order = order_in_file(kingdom, names);
-  EXPECT_EQ(order.front(), 22);
-  EXPECT_EQ(order.back(), 0);
-  std::vector<int> identity(23);
-  std::iota(identity.begin(), identity.end(), 0);
-  EXPECT_EQ(order_in_file(kingdom, kingdom.keypoints), identity);
-}
-
-TEST(OrderInFile, names_what_does_not_fit) {
-  const Topology& kingdom = topology("animal_kingdom23");
-  const auto message = [&](std::vector<std::string> names) -> std::string {
-    try {
-      order_in_file(kingdom, names);
-    } catch (const std::invalid_argument& error) {
-      return error.what();
-    }
-    return "";
-  };
-  std::vector<std::string> names = kingdom.keypoints;
-  names[3] = "left_wing";
-  EXPECT_THAT(message(names), HasSubstr("left_wing"));
-  names = kingdom.keypoints;
-  names[3] = names[2];
-  EXPECT_THAT(message(names), HasSubstr("Eye_Right"));
-  names = kingdom.keypoints;
-  names.pop_back();
-  EXPECT_THAT(message(names), HasSubstr("Tail_End_Back"));
-}
-
 TEST(ToAnimal3d, carries_points_and_leaves_the_rest_unlabelled) {
   std::vector<manifests::Keypoint> points(39);
   for (std::size_t i = 0; i < points.size(); ++i) points[i] = {1.0 * i, 2.0 * i, 2.0F, 1.0F};

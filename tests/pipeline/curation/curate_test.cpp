@@ -147,7 +147,7 @@ TEST_F(Curate, a_dataset_takes_what_the_list_chose) {
     EXPECT_EQ(record.failure, manifests::Reason::none);
   }
   EXPECT_EQ(species, (std::multiset<std::string>{"bear", "cheetah", "cheetah", "horse"}));
-  EXPECT_THAT(dataset.notes, Contains("curation takes 4 pictures: 4 of 8 samples"));
+  EXPECT_EQ(dataset.notes.back().text, "curation takes 4 pictures: 4 of 8 samples");
   ASSERT_EQ(dataset.files.size(), 2U);
   EXPECT_EQ(dataset.files[1], list);
   EXPECT_EQ(candidates::load_configured(curated("test", list)).records.size(), 2U);

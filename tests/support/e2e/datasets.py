@@ -66,6 +66,16 @@ def read_samples(dataset, columns=None):
     return samples
 
 
+def read_byte_column(dataset, name):
+    """The bytes of one column of every sample, in order: an encoded picture, or b"" where there is none."""
+    values = []
+    for path in sorted((dataset / "shards").glob("*.h5")):
+        with h5py.File(path) as shard:
+            offsets = shard[f"{name}_offsets"][:]
+            values += [shard[name][start:end].tobytes() for start, end in zip(offsets, offsets[1:])]
+    return values
+
+
 def _is_bytes(shard, name):
     """Byte columns come in pairs: all values end to end, and their offsets."""
     return f"{name}_offsets" in shard or name.endswith("_offsets")

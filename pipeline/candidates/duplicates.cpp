@@ -1,0 +1,66 @@
+#include "pipeline/candidates/duplicates.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <string>
+#include <unordered_map>
+#include <utility>
+
+namespace q3d::pipeline::candidates {
+namespace {
+
+using manifests::Keypoint;
+
+// Copies of a file may round coordinates to whole pixels.
+constexpr double kRoundingPx = 0.5;
+
+bool is_same_point(const Keypoint& a, const Keypoint& b) {
+  const bool is_visible = a.weight > 0.0F;
+  if (is_visible != (b.weight > 0.0F)) return false;
+  return !is_visible ||
+         (std::abs(a.x_px - b.x_px) <= kRoundingPx && std::abs(a.y_px - b.y_px) <= kRoundingPx);
+}
+
+bool is_same_animal(const Candidate& a, const Candidate& b) {
+  return a.role == b.role && a.record.orientation == b.record.orientation &&
+         std::equal(a.record.keypoints.begin(), a.record.keypoints.end(), b.record.keypoints.begin(),
+                    is_same_point);
+}
+
+struct Repeated {
+  std::size_t count = 0;
+  std::string first;
+};
+
+}  // namespace
+
+void fail_duplicates(std::vector<Candidate>& candidates, std::vector<IngestNote>& notes) {
+  std::unordered_map<std::string, std::vector<const Candidate*>> of_picture;  // by SHA-256
+  std::map<std::string, Repeated> repeated;                                   // by dataset
+  for (Candidate& candidate : candidates) {
+    if (candidate.record.failure != manifests::Reason::none || candidate.image_sha256.empty()) continue;
+    std::vector<const Candidate*>& earlier = of_picture[candidate.image_sha256];
+    const auto found = std::find_if(earlier.begin(), earlier.end(),
+                                    [&](const Candidate* each) { return is_same_animal(*each, candidate); });
+    if (found == earlier.end()) {
+      earlier.push_back(&candidate);
+      continue;
+    }
+    candidate.record.failure = manifests::Reason::duplicate;
+    candidate.record.failure_detail = "it is that of " + (*found)->record.id;
+    Repeated& here = repeated[candidate.record.dataset + "/" + candidate.record.split];
+    if (here.count++ == 0) here.first = candidate.record.id;
+  }
+  for (const auto& [dataset, each] : repeated) {
+    notes.push_back(
+        {loaders::formats::NoteKind::caution, dataset,
+         fmt::format("duplicates: samples with the picture and the keypoints of an earlier one, which "
+                     "is counted once: {}, first {}",
+                     each.count, each.first)});
+  }
+}
+
+}  // namespace q3d::pipeline::candidates

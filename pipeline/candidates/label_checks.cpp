@@ -1,0 +1,89 @@
+#include "pipeline/candidates/label_checks.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace q3d::pipeline::candidates {
+namespace {
+
+using manifests::Box;
+using manifests::Keypoint;
+using manifests::Reason;
+using manifests::SampleRecord;
+
+constexpr double kSlackPx = 2.0;
+constexpr double kBoxSlack = 0.1;       // of the box's longer side; annotators draw boxes and points apart
+constexpr double kSmallestBoxPx = 5.0;  // of the longer side
+constexpr double kLargestFraction = 1.0 + 1e-6;
+
+bool is_visible(const Keypoint& point) {
+  return point.weight > 0.0F;
+}
+
+bool is_fraction(double value) {
+  return value >= 0.0 && value <= kLargestFraction;
+}
+
+// Counts the visible keypoints that lie outside a rectangle by more than `slack_px`.
+int count_outside(const SampleRecord& record, const Box& rectangle, double slack_px) {
+  return static_cast<int>(
+      std::count_if(record.keypoints.begin(), record.keypoints.end(), [&](const Keypoint& point) {
+        const double right = rectangle.x_px + rectangle.w_px;
+        const double bottom = rectangle.y_px + rectangle.h_px;
+        const bool is_inside = point.x_px >= rectangle.x_px - slack_px && point.x_px <= right + slack_px &&
+                               point.y_px >= rectangle.y_px - slack_px && point.y_px <= bottom + slack_px;
+        return is_visible(point) && !is_inside;
+      }));
+}
+
+std::string text(const Box& box) {
+  return fmt::format("x {}, y {}, width {}, height {}", box.x_px, box.y_px, box.w_px, box.h_px);
+}
+
+}  // namespace
+
+int keypoints_outside(const SampleRecord& record, int width_px, int height_px) {
+  return count_outside(record, {0.0, 0.0, 1.0 * width_px, 1.0 * height_px}, kSlackPx);
+}
+
+std::optional<LabelProblem> find_label_problem(const SampleRecord& record, int width_px, int height_px) {
+  const auto visible = std::count_if(record.keypoints.begin(), record.keypoints.end(), is_visible);
+  const bool are_fractions =
+      visible > 1 && std::all_of(record.keypoints.begin(), record.keypoints.end(), [](const Keypoint& point) {
+        return !is_visible(point) || (is_fraction(point.x_px) && is_fraction(point.y_px));
+      });
+  if (are_fractions) {
+    return LabelProblem{
+        Reason::not_in_pixels,
+        fmt::format("keypoints: all {} visible ones are between 0 and 1, which are normalised coordinates; "
+                    "expected pixels: multiply x by the picture's width, {}, and y by its height, {}",
+                    visible, width_px, height_px)};
+  }
+  const Box& box = record.box;
+  if (is_fraction(box.x_px) && is_fraction(box.y_px) && is_fraction(box.w_px) && is_fraction(box.h_px)) {
+    return LabelProblem{
+        Reason::not_in_pixels,
+        fmt::format("box: got {}, which is between 0 and 1 (normalised); expected pixels of a "
+                    "picture of {} x {}",
+                    text(box), width_px, height_px)};
+  }
+  const double longer_side_px = std::max(box.w_px, box.h_px);
+  if (longer_side_px < kSmallestBoxPx) {
+    return LabelProblem{Reason::box_too_small, fmt::format("got {}, expected a longer side of at least {} px",
+                                                           text(box), kSmallestBoxPx)};
+  }
+  if (const int outside = keypoints_outside(record, width_px, height_px); 2 * outside > visible) {
+    return LabelProblem{Reason::keypoints_outside,
+                        fmt::format("{} of {} visible keypoints lie outside the picture of {} x {} px",
+                                    outside, visible, width_px, height_px)};
+  }
+  const int outside = count_outside(record, box, kSlackPx + kBoxSlack * longer_side_px);
+  if (2 * outside <= visible) return std::nullopt;
+  return LabelProblem{
+      Reason::keypoints_outside,
+      fmt::format("{} of {} visible keypoints lie outside the box {}", outside, visible, text(box))};
+}
+
+}  // namespace q3d::pipeline::candidates

@@ -1,0 +1,25 @@
+// Compares what annotation files say of their pictures with the pictures themselves.
+#pragma once
+
+#include "loaders/formats/dataset.h"
+#include "pipeline/config/build_config.h"
+
+namespace q3d::pipeline::candidates {
+
+// Reads the header of every picture, in parallel, and compares its size with the stated one. No picture is
+// decoded.
+// - With `orientation: exif`, the record gets the picture's EXIF orientation, by which the picture is turned
+// when
+//   it is decoded. Box and keypoints stay: they were made on the turned picture.
+// - A record whose stated size is another than the picture's fails as `size_mismatch`; the detail says which
+// key
+//   may be meant. With `resized: scale`, box and keypoints are scaled if width and height differ by one
+//   factor.
+// - A record whose labels cannot be meant on this picture fails (label_checks.h).
+// The notes say how many pictures have an EXIF orientation that is not used, how many records were scaled,
+// and how many have keypoints outside their picture. Records of pictures without a readable header stay as
+// they are: decoding tells what is wrong. Throws manifests::IoError for a picture that is there and cannot be
+// read, and Interrupted.
+void fit_to_pictures(const config::DatasetConfig& options, loaders::formats::Dataset& dataset);
+
+}  // namespace q3d::pipeline::candidates

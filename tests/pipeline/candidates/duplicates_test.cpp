@@ -1,0 +1,63 @@
+#include "pipeline/candidates/duplicates.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace q3d::pipeline::candidates {
+namespace {
+
+using manifests::Reason;
+using ::testing::HasSubstr;
+
+Candidate candidate(const std::string& id, double x_px = 10.0, const std::string& sha256 = "a") {
+  Candidate made;
+  made.record.id = id;
+  made.record.dataset = "lab";
+  made.record.split = "train";
+  made.record.keypoints[3] = {x_px, 20.0, 2.0F, 1.0F};
+  made.image_sha256 = sha256;
+  return made;
+}
+
+std::vector<Reason> reasons(std::vector<Candidate> candidates, std::vector<IngestNote>* notes = nullptr) {
+  std::vector<IngestNote> own;
+  fail_duplicates(candidates, notes == nullptr ? own : *notes);
+  std::vector<Reason> all;
+  for (const Candidate& each : candidates) all.push_back(each.record.failure);
+  return all;
+}
+
+TEST(Duplicates, the_first_of_each_is_kept) {
+  std::vector<IngestNote> notes;
+  EXPECT_EQ(
+      reasons({candidate("1"), candidate("2", 10.4), candidate("3", 40.0), candidate("4", 40.0)}, &notes),
+      (std::vector{Reason::none, Reason::duplicate, Reason::none, Reason::duplicate}));
+  ASSERT_EQ(notes.size(), 1U);
+  EXPECT_EQ(notes[0].kind, loaders::formats::NoteKind::caution);
+  EXPECT_EQ(notes[0].dataset, "lab/train");
+  EXPECT_THAT(notes[0].text, HasSubstr(": 2, first 2"));
+}
+
+TEST(Duplicates, other_animals_are_no_duplicates) {
+  EXPECT_EQ(reasons({candidate("1"), candidate("2", 10.6)}), (std::vector{Reason::none, Reason::none}));
+  EXPECT_EQ(reasons({candidate("1"), candidate("2", 10.0, "b")}), (std::vector{Reason::none, Reason::none}));
+  Candidate hidden = candidate("2");
+  hidden.record.keypoints[5] = {1.0, 1.0, 2.0F, 1.0F};
+  EXPECT_EQ(reasons({candidate("1"), hidden}), (std::vector{Reason::none, Reason::none}));
+  Candidate unlabelled = candidate("2");
+  unlabelled.record.keypoints[5] = {77.0, 77.0, 0.0F, 0.0F};
+  EXPECT_EQ(reasons({candidate("1"), unlabelled}), (std::vector{Reason::none, Reason::duplicate}))
+      << "where an unlabelled point lies says nothing";
+}
+
+TEST(Duplicates, labels_of_another_role_and_failed_ones_do_not_count) {
+  Candidate truth = candidate("2");
+  truth.role = config::Role::truth;
+  EXPECT_EQ(reasons({candidate("1"), truth}), (std::vector{Reason::none, Reason::none}));
+  Candidate failed = candidate("1");
+  failed.record.failure = Reason::size_mismatch;
+  EXPECT_EQ(reasons({failed, candidate("2")}), (std::vector{Reason::size_mismatch, Reason::none}));
+}
+
+}  // namespace
+}  // namespace q3d::pipeline::candidates
