@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <array>
+#include <iterator>
 #include <stdexcept>
 #include <utility>
 
 #include "loaders/formats/formats.h"
+#include "loaders/keypoints/builtin_topologies.h"
 #include "loaders/pictures/box.h"
 
 namespace q3d::loaders::formats {
@@ -18,11 +20,22 @@ using manifests::Reason;
 using manifests::SampleRecord;
 
 using Parser = Dataset (*)(const DatasetOptions&);
-constexpr std::array<std::pair<const char*, Parser>, 5> kParsers{{{"prima", load_prima},
-                                                                  {"superanimal", load_superanimal},
-                                                                  {"animal_kingdom", load_animal_kingdom},
-                                                                  {"coco", load_coco_labels},
-                                                                  {"deeplabcut", load_deeplabcut}}};
+struct Format {
+  const char* name;
+  Parser parser;
+  bool takes_topology = false;
+};
+// SLEAP's and Lightning Pose's files are tables of the same kind as DeepLabCut's, so all three share a
+// parser.
+constexpr std::array<Format, 9> kFormats{{{"prima", load_prima},
+                                          {"superanimal", load_superanimal},
+                                          {"animal_kingdom", load_animal_kingdom},
+                                          {"stanfordextra", load_stanford_extra},
+                                          {"badja", load_badja},
+                                          {"coco", load_coco_labels, true},
+                                          {"deeplabcut", load_deeplabcut, true},
+                                          {"sleap", load_deeplabcut, true},
+                                          {"lightning_pose", load_deeplabcut, true}}};
 
 // Name and split are the first two parts of a sample id and must be separable from the rest.
 void require_id_part(const std::string& part, const char* option) {
@@ -38,17 +51,22 @@ void require_id_part(const std::string& part, const char* option) {
 
 std::vector<std::string> dataset_formats() {
   std::vector<std::string> names;
-  for (const auto& [name, parser] : kParsers) names.emplace_back(name);
+  for (const Format& format : kFormats) names.emplace_back(format.name);
   return names;
+}
+
+bool takes_topology(const std::string& format) {
+  return std::any_of(kFormats.begin(), kFormats.end(),
+                     [&](const Format& each) { return each.name == format && each.takes_topology; });
 }
 
 Dataset load_dataset(const DatasetOptions& options) {
   require_id_part(options.name, "name");
   require_id_part(options.split, "split");
   std::string known;
-  for (const auto& [name, parser] : kParsers) {
-    if (options.format == name) return parser(options);
-    known += fmt::format("{}{}", known.empty() ? "" : ", ", name);
+  for (const Format& format : kFormats) {
+    if (options.format == format.name) return format.parser(options);
+    known += fmt::format("{}{}", known.empty() ? "" : ", ", format.name);
   }
   throw std::invalid_argument(
       fmt::format("dataset {}: format: got \"{}\", expected one of {}", options.name, options.format, known));
@@ -148,7 +166,8 @@ Dataset finished(Loading& loading, std::vector<SampleRecord> records) {
   note("picture names that differ from the name of the file in letter case, accents, '+' or .jpeg",
        finder.found_by_spelling());
   std::vector<std::filesystem::path> files{loading.file};
-  files.insert(files.end(), loading.more_files.begin(), loading.more_files.end());
+  std::copy_if(loading.more_files.begin(), loading.more_files.end(), std::back_inserter(files),
+               [](const std::filesystem::path& file) { return !keypoints::is_builtin_topology(file); });
   return {std::move(records), loading.notes.list(), std::move(files)};
 }
 

@@ -22,9 +22,10 @@ struct DatasetOptions {
   // (superanimal), root/dataset (animal_kingdom), or root if that folder does not exist.
   std::filesystem::path images;
 
-  // The following options belong to the formats "coco" and "deeplabcut" only.
-  std::filesystem::path
-      topology{};  // JSON file that names the keypoints (loaders/keypoints/topology_file.h); required
+  // The following options belong to the formats that take a topology (takes_topology).
+  // A JSON file that names the keypoints, or the name of a built-in topology
+  // (loaders/keypoints/topology_file.h); required.
+  std::filesystem::path topology{};
   std::vector<std::string> categories{};  // "coco": names of the categories to take; empty takes all
   std::string species{};  // species of all animals; if empty, it comes from the file, if the file states it
   double min_confidence = 0.6;  // keypoints with less confidence get weight 0 (DeepLabCut's p-cutoff)
@@ -45,10 +46,18 @@ struct Dataset {
 // - "prima": the JSON of PRIMA and AniMer (Animal3D, CtrlAni3D and sets converted to it).
 // - "superanimal": SuperAnimal-Quadruped's COCO file with 39 keypoints.
 // - "animal_kingdom": its list of records with 23 keypoints, or its COCO file, told apart by content.
+// - "stanfordextra": StanfordExtra's list of dogs with 24 keypoints, or the first 20 of them.
+// - "badja": BADJA's joint annotations of a video, or a folder of such files.
 // - "coco": any other COCO keypoints, described by a topology file (AP-10K, AnimalPose, a lab's own).
 // - "deeplabcut": DeepLabCut's .h5 and .csv, labels and predictions; `annotations` is one of these files, or
 //   the folder of a project with its CollectedData files.
+// - "sleap": SLEAP's .slp, analysis .h5 and analysis .csv of one video.
+// - "lightning_pose": Lightning Pose's labels and predictions as .csv.
+// The last three differ in name alone: each reads the files of the others too.
 std::vector<std::string> dataset_formats();
+
+// Returns true for the formats whose keypoints a topology describes.
+bool takes_topology(const std::string& format);
 
 // Loads a dataset. Sample ids are name/split/picture#annotation. The annotation is its id if all ids in the
 // file are distinct, else its index.

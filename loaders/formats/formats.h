@@ -17,6 +17,8 @@ namespace q3d::loaders::formats {
 Dataset load_prima(const DatasetOptions& options);
 Dataset load_superanimal(const DatasetOptions& options);
 Dataset load_animal_kingdom(const DatasetOptions& options);
+Dataset load_stanford_extra(const DatasetOptions& options);
+Dataset load_badja(const DatasetOptions& options);
 Dataset load_coco_labels(const DatasetOptions& options);
 Dataset load_deeplabcut(const DatasetOptions& options);
 

@@ -17,6 +17,7 @@
 #include <string_view>
 
 #include "loaders/formats/label_table.h"
+#include "loaders/formats/sleap.h"
 #include "manifests/csv.h"
 #include "manifests/text_file.h"
 
@@ -119,6 +120,13 @@ double number(const CsvReader& lines, std::string_view cell, bool has_decimal_co
              "a number or nothing");
 }
 
+// Lightning Pose ends its predictions with a column of words, which set a frame belongs to: "set" in the
+// first row of the header, and nothing below it.
+bool is_set_column(const std::vector<std::string>& names) {
+  return names.front() == "set" &&
+         std::all_of(names.begin() + 1, names.end(), [](const std::string& name) { return name.empty(); });
+}
+
 bool is_number(const std::string& text) {
   return !text.empty() && text.find_first_not_of("0123456789") == std::string::npos;
 }
@@ -161,6 +169,7 @@ bool are_blank(const Cells& cells) {
 
 LabelTable read_label_csv(const std::filesystem::path& file) {
   const std::string text = manifests::read_text_file(file, "DeepLabCut's .h5 or .csv");
+  if (is_sleap_csv(text)) return read_sleap_csv(text, file.string());
   const char separator = separator_of(text);
   CsvReader lines(text, file.string(), separator);
   Cells cells;
@@ -171,6 +180,7 @@ LabelTable read_label_csv(const std::filesystem::path& file) {
     if (header.is_blank(column)) continue;  // a spreadsheet's empty columns
     std::vector<std::string> names;
     for (const Cells& level : header.levels) names.push_back(level[column]);
+    if (is_set_column(names)) continue;
     table.columns.push_back(
         label_column(std::move(names), fmt::format("{}: column {}", file.string(), column)));
     places.push_back(column);

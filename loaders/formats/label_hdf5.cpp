@@ -24,6 +24,7 @@
 #include "loaders/formats/label_table.h"
 #include "loaders/formats/own_process.h"
 #include "loaders/formats/pickled_names.h"
+#include "loaders/formats/sleap.h"
 #include "manifests/hdf5.h"
 
 namespace q3d::loaders::formats {
@@ -334,6 +335,9 @@ std::string frame_group(hid_t file) {
 }
 
 LabelTable read_open_file(hid_t file, std::uint64_t file_bytes) {
+  const ForeignHdf5 opened(file, file_bytes);
+  if (auto table = read_sleap_labels(opened)) return std::move(*table);
+  if (auto table = read_sleap_analysis(opened)) return std::move(*table);
   const PandasGroup group(file, frame_group(file), file_bytes);
   const std::string layout = group.text_attribute("pandas_type");
   LabelTable table;

@@ -33,10 +33,31 @@ bool any_nonzero(const std::array<float, N>& values) {
   return std::any_of(values.begin(), values.end(), [](float value) { return value != 0.0F; });
 }
 
+// Returns how many numbers `shape` holds if they are betas of another shape space than SMAL's 41, such as the
+// 145 of SMAL+; else 0. Their meaning differs, so they are no label here. A pose means the same in both. A
+// handful of numbers is no shape space but a damaged record.
+std::size_t betas_of_another_model(const nlohmann::json& shape) {
+  constexpr std::size_t kSmallestShapeSpace = 10;
+  const bool is_one =
+      shape.is_array() && shape.size() >= kSmallestShapeSpace && shape.size() != kBetas &&
+      shape.size() != kFirstBetas &&
+      std::all_of(shape.begin(), shape.end(), [](const auto& beta) { return beta.is_number(); });
+  return is_one ? shape.size() : 0;
+}
+
 // `shape` holds all 41 numbers, or 20 with the other 21 in `shape_extra`, which some exports lack.
 void read_betas(const nlohmann::json& record, RecordReader& reader, Loading& loading, const std::string& id,
                 BodyTruth& truth) {
   if (!reader.has("shape")) return;
+  if (const std::size_t count = betas_of_another_model(record["shape"]); count > 0) {
+    loading.notes.count(
+        fmt::format(
+            "shape has {} numbers, which are betas of another body model than SMAL's 41 (or 20 and 21), "
+            "so the shape is no label; keypoints and pose are read",
+            count),
+        id);
+    return;
+  }
   const bool is_whole = record["shape"].is_array() && record["shape"].size() == kBetas;
   copy_into(truth.betas, reader.finite_numbers("shape", is_whole ? kBetas : kFirstBetas, 1));
   if (is_whole) return;

@@ -1,6 +1,7 @@
 #include "loaders/keypoints/topology_file.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -8,7 +9,9 @@
 #include <set>
 #include <stdexcept>
 #include <string_view>
+#include <utility>
 
+#include "loaders/keypoints/builtin_topologies.h"
 #include "manifests/json_file.h"
 
 namespace q3d::loaders::keypoints {
@@ -22,8 +25,7 @@ constexpr std::size_t kMaxKeypoints = 1000;  // what is larger is no list of an 
 
 class Reader {
  public:
-  explicit Reader(const std::filesystem::path& file)
-      : file_(file), document_(manifests::read_json_file(file)) {}
+  Reader(const std::filesystem::path& file, json document) : file_(file), document_(std::move(document)) {}
 
   Topology read() {
     check_keys();
@@ -169,8 +171,25 @@ class Reader {
 
 }  // namespace
 
-Topology read_topology_file(const std::filesystem::path& file) {
-  return Reader(file).read();
+bool is_builtin_topology(const std::filesystem::path& name_or_file) {
+  const auto all = builtin_topologies();
+  return std::any_of(all.begin(), all.end(),
+                     [&](const BuiltinTopology& each) { return each.name == name_or_file.native(); });
+}
+
+Topology read_topology_file(const std::filesystem::path& name_or_file) {
+  std::vector<std::string_view> names;
+  for (const BuiltinTopology& each : builtin_topologies()) {
+    if (each.name == name_or_file.native()) return Reader(name_or_file, json::parse(each.text)).read();
+    names.push_back(each.name);
+  }
+  if (!std::filesystem::exists(name_or_file)) {
+    throw std::runtime_error(fmt::format(
+        "{}: there is no such file, and no built-in topology of this name; the built-in ones are {}. "
+        "`quadruped3d topology --from FILE` makes one for a label file",
+        name_or_file.string(), fmt::join(names, ", ")));
+  }
+  return Reader(name_or_file, manifests::read_json_file(name_or_file)).read();
 }
 
 }  // namespace q3d::loaders::keypoints

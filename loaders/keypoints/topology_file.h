@@ -21,9 +21,11 @@
 
 namespace q3d::loaders::keypoints {
 
-// Reads a topology. Throws std::runtime_error that names file and key, what was found and what was expected:
-// for unknown keys and names, for names that occur twice, and for a map in which a left keypoint and its
-// mirror image come from two keypoints that are not mirror images of each other.
-Topology read_topology_file(const std::filesystem::path& file);
+// Reads a topology from a file, or the built-in one of this name (builtin_topologies.h). Throws
+// std::runtime_error that names file and key, what was found and what was expected: for unknown keys and
+// names, for names that occur twice, and for a map in which a left keypoint and its mirror image come from
+// two keypoints that are not mirror images of each other. Lists the built-in topologies if there is no such
+// file.
+Topology read_topology_file(const std::filesystem::path& name_or_file);
 
 }  // namespace q3d::loaders::keypoints

@@ -8,6 +8,7 @@
 #include "pipeline/network/torch_bodies.h"
 #include "pipeline/network/torch_network.h"
 #include "pipeline/run/log.h"
+#include "pipeline/run/words.h"
 
 namespace q3d::pipeline::build {
 namespace {
@@ -40,7 +41,9 @@ Workspace::Workspace(const config::BuildConfig& config, const run::RunOptions& o
       ingest_(candidates::ingest(config, digests_, network::load_body_meshes)) {
   leakage::leave_out(config, digests_, options.out, options.quiet, ingest_);
   if (!options_.quiet) {
-    run::log_info(fmt::format("{} candidates in {} units", ingest_.candidates.size(), ingest_.units.size()));
+    run::log_info(fmt::format("{} in {}",
+                              run::counted(static_cast<std::int64_t>(ingest_.candidates.size()), "candidate"),
+                              run::counted(static_cast<std::int64_t>(ingest_.units.size()), "unit")));
   }
   for (const candidates::IngestNote& note : ingest_.notes) {
     const bool is_caution = note.kind == loaders::formats::NoteKind::caution;

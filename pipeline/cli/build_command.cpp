@@ -9,13 +9,15 @@
 #include "pipeline/build/build.h"
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/options.h"
+#include "pipeline/run/command_line.h"
 #include "pipeline/run/progress.h"
+#include "pipeline/run/words.h"
 
 namespace q3d::pipeline::cli {
 namespace {
 
 struct Arguments {
-  std::vector<std::filesystem::path> configs;
+  ConfigArguments config;
   std::filesystem::path veto;
   run::RunOptions run;
   bool json = false;
@@ -43,10 +45,12 @@ void print_summary(const build::BuildSummary& summary) {
   for (const auto& [kind, count] : summary.dataset.labels) {
     if (count > 0) fmt::print(stderr, "  {} {}", manifests::to_string(kind), count);
   }
-  fmt::print(stderr, "\n  {} shards in {}\n", summary.dataset.shards.size(), summary.folder.string());
-  fmt::print(stderr, "  all verdicts: {}\n", (summary.folder / "verdicts.csv").string());
-  fmt::print(stderr, "next: quadruped3d verify {0}\n      quadruped3d inspect {0} --sheet sheet.png\n",
+  fmt::print(stderr, "\n  {} in {}\n",
+             run::counted(static_cast<std::int64_t>(summary.dataset.shards.size()), "shard"),
              summary.folder.string());
+  fmt::print(stderr, "  all verdicts: {}\n", (summary.folder / "verdicts.csv").string());
+  fmt::print(stderr, "next: {}\n      {}\n", run::command_line({"verify", summary.folder.string()}),
+             run::command_line({"inspect", summary.folder.string(), "--sheet", "sheet.png"}));
 }
 
 // Counts by the enumerators' names.
@@ -77,7 +81,7 @@ nlohmann::ordered_json to_json(const build::BuildSummary& summary) {
 
 // --veto replaces the config's key `veto`.
 config::BuildConfig configured(const Arguments& arguments) {
-  config::BuildConfig config = config::load_build_config(arguments.configs);
+  config::BuildConfig config = config::load_build_config(arguments.config.files, arguments.config.settings());
   if (arguments.veto.empty()) return config;
   config.veto = std::filesystem::absolute(arguments.veto);
   config.as_written["veto"] = arguments.veto.string();
@@ -89,7 +93,8 @@ config::BuildConfig configured(const Arguments& arguments) {
 Command add_build(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = declare(app, "build");
-  config_option(*command, arguments->configs)->required();
+  config_option(*command, arguments->config)->required();
+  device_option(*command, arguments->config);
   out_option(*command, arguments->run.out, "output folder; OUT/latest will be the newest dataset")
       ->required();
   command
@@ -104,6 +109,7 @@ Command add_build(CLI::App& app) {
       "  quadruped3d build --config configs/sample.json --config out/thresholds.json --out out\n"
       "  quadruped3d build -c my.json -o out --json > summary.json\n"
       "  quadruped3d build -c my.json -o out --veto veto.txt\n"
+      "  quadruped3d build -c my.json -o out --set tta.learning_rate=2e-6 --device cuda:1\n"
       "  quadruped3d build -c configs/world_pools/animal3d.json -o out/pools/animal3d\n"
       "If a build was stopped or killed, run the same command again: it continues where it left off and\n"
       "ends with the same bytes. Bad pictures and records never stop a build; they are counted and listed\n"

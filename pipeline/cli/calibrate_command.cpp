@@ -10,13 +10,15 @@
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/options.h"
 #include "pipeline/report/calibration_figure.h"
+#include "pipeline/run/command_line.h"
 #include "pipeline/run/progress.h"
+#include "pipeline/run/words.h"
 
 namespace q3d::pipeline::cli {
 namespace {
 
 struct Arguments {
-  std::vector<std::filesystem::path> configs;
+  ConfigArguments config;
   run::RunOptions run;
   std::filesystem::path write;
   std::filesystem::path figure;
@@ -25,8 +27,9 @@ struct Arguments {
 
 void print_pool(const filters::CalibratedPool& pool) {
   const filters::Calibration& result = pool.calibration;
-  fmt::print(stderr, "\n{}: {} candidates have a prediction, {} were adapted\n",
-             pool.dataset.empty() ? "all datasets" : pool.dataset, pool.judged, pool.adapted);
+  fmt::print(stderr, "\n{}: {} with a prediction, of which {} adapted\n",
+             pool.dataset.empty() ? "all datasets" : pool.dataset, run::counted(pool.judged, "candidate"),
+             run::counted(pool.adapted, "was", "were"));
   fmt::print(stderr, "{}", report::calibration_table(pool));
   fmt::print(stderr, "  retained {:.1f} %, refined {:.1f} %, discarded {:.1f} %\n", 100 * result.retained,
              100 * result.refined, 100 * (1 - result.retained - result.refined));
@@ -41,15 +44,18 @@ void print_pool(const filters::CalibratedPool& pool) {
 }
 
 void print_summary(const build::CalibrationSummary& summary, const Arguments& arguments) {
-  fmt::print(stderr, "\ncalibrated on {} candidates in {}\n", summary.candidates,
+  fmt::print(stderr, "\ncalibrated on {} in {}\n", run::counted(summary.candidates, "candidate"),
              run::human_duration(summary.seconds));
   for (const filters::CalibratedPool& pool : summary.pools) print_pool(pool);
   fmt::print(stderr, "\n");
   fmt::print("{}", build::thresholds_layer(summary));
   if (!arguments.figure.empty()) fmt::print(stderr, "wrote {}\n", arguments.figure.string());
   if (!arguments.write.empty()) {
-    fmt::print(stderr, "next: quadruped3d build --config <the same> --config {} --out <the same>\n",
-               arguments.write.string());
+    std::vector<std::string> words{"build"};
+    const std::vector<std::string> config = arguments.config.words();
+    words.insert(words.end(), config.begin(), config.end());
+    words.insert(words.end(), {"--config", arguments.write.string(), "--out", arguments.run.out.string()});
+    fmt::print(stderr, "next: {}\n", run::command_line(words));
   }
 }
 
@@ -89,7 +95,8 @@ nlohmann::ordered_json to_json(const build::CalibrationSummary& summary) {
 Command add_calibrate(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = declare(app, "calibrate");
-  config_option(*command, arguments->configs)->required();
+  config_option(*command, arguments->config)->required();
+  device_option(*command, arguments->config);
   out_option(*command, arguments->run.out, "output folder; a later build in it reuses the predictions")
       ->required();
   command->add_option("-w,--write", arguments->write,
@@ -109,8 +116,8 @@ Command add_calibrate(CLI::App& app) {
       "it. With \"per_dataset\": true every dataset gets thresholds of its own. Guards that bound labels\n"
       "act later and lower the shares.");
   return [arguments] {
-    const build::CalibrationSummary summary =
-        build::calibrate(config::load_build_config(arguments->configs), arguments->run);
+    const build::CalibrationSummary summary = build::calibrate(
+        config::load_build_config(arguments->config.files, arguments->config.settings()), arguments->run);
     if (!arguments->write.empty()) build::write_thresholds(arguments->write, summary);
     if (!arguments->figure.empty()) {
       manifests::write_file_atomically(arguments->figure, report::calibration_figure(summary.pools));

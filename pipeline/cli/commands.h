@@ -17,7 +17,7 @@ struct CommandInfo {
   std::string_view description;  // one line of `quadruped3d --help`
   bool needs_network;            // links LibTorch, and is therefore in the program quadruped3d-network
 };
-inline constexpr std::array<CommandInfo, 15> kCommands{{
+inline constexpr std::array<CommandInfo, 16> kCommands{{
     {"build", "make a versioned dataset of labels from annotated photographs", true},
     {"calibrate", "find the thresholds that give the wanted shares of labels", true},
     {"verify", "read a whole dataset and check every byte of it", false},
@@ -32,6 +32,7 @@ inline constexpr std::array<CommandInfo, 15> kCommands{{
     {"config", "show a whole config, with all defaults", false},
     {"explain", "show all that is known of one candidate, and why it got its verdict", false},
     {"leakage", "find pictures of the pool that are also in a test set, or twice in the pool", false},
+    {"topology", "write a topology file for a lab's labels, and show which points are left and right", false},
     {"curate", "choose a balanced subset of a large dataset, by species; build takes the list", false},
 }};
 
@@ -58,5 +59,6 @@ Command add_compare(CLI::App& app);
 Command add_compare_labels(CLI::App& app);
 Command add_config(CLI::App& app);
 Command add_curate(CLI::App& app);
+Command add_topology(CLI::App& app);
 
 }  // namespace q3d::pipeline::cli

@@ -17,7 +17,7 @@ namespace q3d::pipeline::cli {
 namespace {
 
 struct Arguments {
-  std::vector<std::filesystem::path> configs;
+  ConfigArguments config;
   std::string schema_of = "build";
   std::filesystem::path page;
   bool writes = false;
@@ -25,12 +25,13 @@ struct Arguments {
 
 int show(const Arguments& arguments) {
   nlohmann::ordered_json document;
-  if (arguments.configs.empty()) {
+  if (arguments.config.files.empty() && arguments.config.settings().empty()) {
     for (const std::string& name : config::profile_names())
       document["profiles"][name] = config::profile_layer(name);
     fmt::print(stderr, "these are the profiles; with --config, the command prints a whole config\n");
   } else {
-    document = config::effective_config(config::load_build_config(arguments.configs));
+    document = config::effective_config(
+        config::load_build_config(arguments.config.files, arguments.config.settings()));
   }
   fmt::print("{}\n", document.dump(2));
   return 0;
@@ -64,7 +65,8 @@ int make_tables(const Arguments& arguments) {
 CLI::App* add_show(CLI::App& command, Arguments& arguments) {
   CLI::App* shown = command.add_subcommand(
       "show", "print the config as JSON, with its profile expanded and all defaults filled in");
-  config_option(*shown, arguments.configs);
+  config_option(*shown, arguments.config);
+  device_option(*shown, arguments.config);
   return shown;
 }
 
@@ -99,6 +101,7 @@ Command add_config(CLI::App& app) {
       "Examples:\n"
       "  quadruped3d config show                                  what each profile stands for\n"
       "  quadruped3d config show -c my.json -c out/thresholds.json\n"
+      "  quadruped3d config show -c my.json --set profile=strict --set guards.mask_iou_min=0.6\n"
       "  quadruped3d config schema > quadruped3d.schema.json\n"
       "  quadruped3d config schema training > training.schema.json\n"
       "The output of `show` is a config again and gives the same dataset. docs/config.md explains every key.";

@@ -13,7 +13,7 @@ namespace q3d::pipeline::cli {
 namespace {
 
 struct Arguments {
-  std::vector<std::filesystem::path> configs;
+  ConfigArguments config;
   std::filesystem::path out;
   bool json = false;
 };
@@ -47,7 +47,7 @@ void print_summary(const curation::CurationSummary& summary) {
   }
   fmt::print(stderr, "\n  list of all pictures: {}\n", summary.list.string());
   fmt::print(stderr,
-             "next: name this list as \"curation\" of the dataset in a build's config (docs/datasets.md)\n");
+             "Name this list as \"curation\" of the dataset in a build's config (docs/datasets.md).\n");
 }
 
 }  // namespace
@@ -55,7 +55,7 @@ void print_summary(const curation::CurationSummary& summary) {
 Command add_curate(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = declare(app, "curate");
-  config_option(*command, arguments->configs,
+  config_option(*command, arguments->config,
                 "JSON file with the rule; keys of a later file replace those of an earlier one")
       ->required();
   out_option(*command, arguments->out, "folder for the list")->required();
@@ -69,8 +69,9 @@ Command add_curate(CLI::App& app) {
       "The command reads no pictures. The same files, rule and seed give the same list. NAME.json beside\n"
       "the list holds the rule, the digests of the files that were read, and all counts.");
   return [arguments] {
-    const curation::CurationSummary summary =
-        curation::run_curate(curation::load_curation_config(arguments->configs), arguments->out);
+    const curation::CurationSummary summary = curation::run_curate(
+        curation::load_curation_config(arguments->config.files, arguments->config.settings()),
+        arguments->out);
     print_summary(summary);
     if (arguments->json) {
       const nlohmann::ordered_json document = {{"list", summary.list.string()},

@@ -14,7 +14,7 @@ namespace q3d::pipeline::cli {
 namespace {
 
 struct Arguments {
-  std::vector<std::filesystem::path> configs;
+  ConfigArguments config;
   std::filesystem::path checkpoint;
   std::filesystem::path out;
   evaluation::EvaluationOptions options;
@@ -23,7 +23,8 @@ struct Arguments {
 };
 
 int run(const Arguments& arguments) {
-  const auto config = evaluation::load_evaluation_config(arguments.configs, arguments.checkpoint);
+  const auto config = evaluation::load_evaluation_config(arguments.config.files, arguments.checkpoint,
+                                                         arguments.config.settings());
   const evaluation::Evaluation result = evaluation::evaluate(config, arguments.options);
   const evaluation::Tables tables = evaluation::make_tables(result);
   evaluation::write_evaluation(arguments.out, result, tables);
@@ -35,8 +36,11 @@ int run(const Arguments& arguments) {
   fmt::print(people, "\n{} (sha256 {}...) on {}, in {}\n\n{}", result.checkpoint,
              result.checkpoint_sha256.substr(0, 12), result.device, run::human_duration(result.seconds),
              evaluation::summary_text(result, tables, arguments.species));
-  fmt::print(people, "all samples: {}\nnext: quadruped3d compare --before {} --after <another evaluation>\n",
-             (arguments.out / "samples.csv").string(), arguments.out.string());
+  fmt::print(
+      people,
+      "all samples: {}\nTo test whether another network is better, evaluate it too, and give `quadruped3d "
+      "compare` both folders.\n",
+      (arguments.out / "samples.csv").string());
   if (arguments.json) fmt::print("{}\n", evaluation::to_json(result, tables).dump());
   return 0;
 }
@@ -69,7 +73,8 @@ void add_settings(CLI::App& command, evaluation::EvaluationOptions& options) {
 Command add_evaluate(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = declare(app, "evaluate");
-  config_option(*command, arguments->configs)->required();
+  config_option(*command, arguments->config)->required();
+  device_option(*command, arguments->config);
   command
       ->add_option("--checkpoint", arguments->checkpoint,
                    "weights to measure, instead of the config's network.checkpoint")

@@ -11,15 +11,15 @@ namespace q3d::pipeline::cli {
 namespace {
 
 struct Arguments {
-  std::vector<std::filesystem::path> configs;
+  ConfigArguments config;
   evaluation::LabelOptions options;
   std::filesystem::path report;
   bool json = false;
 };
 
 int run(const Arguments& arguments) {
-  const evaluation::LabelEvaluation result =
-      evaluation::evaluate_labels(config::load_build_config(arguments.configs), arguments.options);
+  const evaluation::LabelEvaluation result = evaluation::evaluate_labels(
+      config::load_build_config(arguments.config.files, arguments.config.settings()), arguments.options);
   if (!arguments.report.empty()) evaluation::write_label_evaluation(arguments.report, result);
   std::FILE* const people = arguments.json ? stderr : stdout;
   fmt::print(people, "\n{}\n{}", result.dataset, evaluation::summary_text(result));
@@ -36,7 +36,7 @@ Command add_evaluate_labels(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   evaluation::LabelOptions& options = arguments->options;
   CLI::App* command = declare(app, "evaluate-labels");
-  config_option(*command, arguments->configs, "the build's config, thresholds included")->required();
+  config_option(*command, arguments->config, "the build's config, thresholds included")->required();
   out_option(*command, options.run.out, "the build's output folder")
       ->required()
       ->check(CLI::ExistingDirectory);

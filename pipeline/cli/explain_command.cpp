@@ -26,13 +26,16 @@ Command add_explain(CLI::App& app) {
       ->required()
       ->check(CLI::ExistingPath);
   command
-      ->add_option("sample", arguments->sample,
-                   "the id of the sample, as in the first column of verdicts.csv")
+      ->add_option(
+          "sample", arguments->sample,
+          "the id of the sample, as in the first column of verdicts.csv, or a part of it that no other\n"
+          "id has")
       ->required();
   json_flag(*command, arguments->json, "print the result as JSON");
   command->footer(
       "Examples:\n"
       "  quadruped3d explain out 'superanimal/train/images/wolf_1.jpg#12'\n"
+      "  quadruped3d explain out wolf_1                                          a part of the id\n"
       "  quadruped3d explain out 'superanimal/train/images/wolf_1.jpg#12' --json | jq .curve\n"
       "The result has the source, the crop, the error of every keypoint, the course of adaptation, and the\n"
       "number that decided the verdict.\n"

@@ -29,7 +29,7 @@ Command add_inspect(CLI::App& app) {
   command->add_option("path", arguments->path, "a dataset's folder, an output folder, or one shard")
       ->required()
       ->check(CLI::ExistingPath);
-  command->add_option("--sample", arguments->sample, "describe the sample with this id");
+  command->add_option("--sample", arguments->sample, "describe the sample with this id, or a part of an id");
   command->add_option("--sheet", arguments->sheet,
                       "write a PNG that shows crops with annotated and projected keypoints");
   command->add_option("--count", arguments->count, "number of samples on the sheet")

@@ -8,13 +8,15 @@
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/options.h"
 #include "pipeline/leakage/leakage_run.h"
+#include "pipeline/run/command_line.h"
 #include "pipeline/run/progress.h"
+#include "pipeline/run/words.h"
 
 namespace q3d::pipeline::cli {
 namespace {
 
 struct Arguments {
-  std::vector<std::filesystem::path> configs;
+  ConfigArguments config;
   run::RunOptions run;
   bool json = false;
 };
@@ -25,27 +27,30 @@ std::size_t count_leaks(const leakage::LeakageRunSummary& summary) {
   return count;
 }
 
-void print_summary(const leakage::LeakageRunSummary& summary, const std::filesystem::path& out) {
+void print_summary(const leakage::LeakageRunSummary& summary, const Arguments& arguments) {
   for (const std::string& note : summary.notes) fmt::print(stderr, "note: {}\n", note);
-  fmt::print(stderr, "\n{} pictures of {} candidates compared with {} test pictures in {}\n",
-             summary.pool_pictures, summary.candidates, summary.test_pictures,
-             run::human_duration(summary.seconds));
+  fmt::print(stderr, "\n{} of {} compared with {} in {}\n", run::counted(summary.pool_pictures, "picture"),
+             run::counted(summary.candidates, "candidate"),
+             run::counted(summary.test_pictures, "test picture"), run::human_duration(summary.seconds));
   fmt::print(stderr, "  candidates whose picture is in a test set: {}\n", count_leaks(summary));
   for (const auto& [evidence, leaks] : summary.leaks_by_evidence) {
     fmt::print(stderr, "    {:<12} {}\n", evidence, leaks);
   }
-  fmt::print(stderr, "  groups of pictures in the pool that look alike: {} ({} pictures)\n", summary.groups,
-             summary.pictures_in_groups);
+  fmt::print(stderr, "  groups of pictures in the pool that look alike: {} ({})\n", summary.groups,
+             run::counted(summary.pictures_in_groups, "picture"));
   fmt::print(stderr,
              "  page with the pictures: {}\n  lists beside it: leaks.csv, duplicates.csv and leakage.json\n",
-             (out / "leakage.html").string());
+             (arguments.run.out / "leakage.html").string());
   if (summary.test_pictures == 0) {
-    fmt::print(stderr, "next: name the test sets under \"leakage\" in the config (docs/config.md)\n");
-  } else {
-    fmt::print(
-        stderr,
-        "next: run quadruped3d build with the same config; it leaves out the pseudo labels among them\n");
+    fmt::print(stderr, "Name the test sets under \"leakage\" in the config (docs/config.md).\n");
+    return;
   }
+  std::vector<std::string> words{"build"};
+  const std::vector<std::string> config = arguments.config.words();
+  words.insert(words.end(), config.begin(), config.end());
+  words.insert(words.end(), {"--out", arguments.run.out.string()});
+  fmt::print(stderr, "A build with the same config leaves out the pseudo labels among them.\nnext: {}\n",
+             run::command_line(words));
 }
 
 }  // namespace
@@ -53,7 +58,7 @@ void print_summary(const leakage::LeakageRunSummary& summary, const std::filesys
 Command add_leakage(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = declare(app, "leakage");
-  config_option(*command, arguments->configs)->required();
+  config_option(*command, arguments->config)->required();
   out_option(*command, arguments->run.out, "folder for the lists, the HTML page and the cache of hashes")
       ->required();
   threads_option(*command, arguments->run.threads);
@@ -62,7 +67,7 @@ Command add_leakage(CLI::App& app) {
   command->footer(
       "Examples:\n"
       "  quadruped3d leakage --config my.json --out out\n"
-      "The config is that of a build, with the test sets under \"leakage\":\n"
+      "The config is that of a build, with the test sets under \"leakage\". It needs no \"network\".\n"
       "  \"leakage\": { \"test_sets\": [\n"
       "    { \"name\": \"animal3d\", \"format\": \"prima\", \"root\": \"animal3d\",\n"
       "      \"annotations\": \"test.json\", \"split\": \"test\" } ] }\n"
@@ -72,8 +77,10 @@ Command add_leakage(CLI::App& app) {
       "finds them there.");
   return [arguments] {
     const leakage::LeakageRunSummary summary =
-        leakage::run_leakage(config::load_build_config(arguments->configs), arguments->run);
-    print_summary(summary, arguments->run.out);
+        leakage::run_leakage(config::load_build_config(arguments->config.files, arguments->config.settings(),
+                                                       config::NetworkKey::optional),
+                             arguments->run);
+    print_summary(summary, *arguments);
     if (arguments->json) {
       const nlohmann::ordered_json document = {{"candidates", summary.candidates},
                                                {"pool_pictures", summary.pool_pictures},

@@ -2,20 +2,24 @@
 // start at once; the others run in quadruped3d-network, which links LibTorch.
 
 #include <array>
+#include <string_view>
 
 #include "pipeline/cli/network_program.h"
 #include "pipeline/cli/program.h"
 
 int main(int argc, char** argv) {
   namespace cli = q3d::pipeline::cli;
-  if (argc > 1 && cli::needs_network(argv[1])) return cli::become_network_program(argv);
-  constexpr std::array<cli::CommandEntry, 6> kEntries{{
+  // `help COMMAND` is answered where the command is.
+  const int command = argc > 2 && std::string_view(argv[1]) == "help" ? 2 : 1;
+  if (argc > command && cli::needs_network(argv[command])) return cli::become_network_program(argv);
+  constexpr std::array<cli::CommandEntry, 7> kEntries{{
       {"verify", cli::add_verify},
       {"inspect", cli::add_inspect},
       {"config", cli::add_config},
       {"explain", cli::add_explain},
       {"leakage", cli::add_leakage},
       {"curate", cli::add_curate},
+      {"topology", cli::add_topology},
   }};
   return cli::run_program(argc, argv, kEntries);
 }

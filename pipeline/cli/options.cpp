@@ -1,10 +1,38 @@
 #include "pipeline/cli/options.h"
 
+#include <nlohmann/json.hpp>
+
 namespace q3d::pipeline::cli {
 
-CLI::Option* config_option(CLI::App& command, std::vector<std::filesystem::path>& configs,
-                           const std::string& text) {
-  return command.add_option("-c,--config", configs, text)->check(CLI::ExistingFile);
+std::vector<std::string> ConfigArguments::settings() const {
+  std::vector<std::string> all = set;
+  if (!device.empty()) all.push_back("network.device=" + nlohmann::json(device).dump());
+  return all;
+}
+
+std::vector<std::string> ConfigArguments::words() const {
+  std::vector<std::string> all;
+  for (const std::filesystem::path& file : files) all.insert(all.end(), {"--config", file.string()});
+  for (const std::string& setting : set) all.insert(all.end(), {"--set", setting});
+  if (!device.empty()) all.insert(all.end(), {"--device", device});
+  return all;
+}
+
+CLI::Option* config_option(CLI::App& command, ConfigArguments& config, const std::string& text) {
+  command
+      .add_option("--set", config.set,
+                  "set one key of the config, such as --set tta.learning_rate=2e-6 or --set "
+                  "datasets.walk.species=goat; may be given several times (docs/config.md)")
+      ->type_name("KEY=VALUE")
+      ->type_size(1)
+      ->allow_extra_args(false);
+  return command.add_option("-c,--config", config.files, text)->check(CLI::ExistingFile);
+}
+
+CLI::Option* device_option(CLI::App& command, ConfigArguments& config) {
+  return command.add_option("--device", config.device,
+                            "where the network runs, instead of the config's network.device: auto, cpu, cuda "
+                            "or cuda:1");
 }
 
 CLI::Option* out_option(CLI::App& command, std::filesystem::path& out, const std::string& text) {

@@ -12,10 +12,25 @@
 
 namespace q3d::pipeline::cli {
 
-// -c,--config: one or more files that exist. Not required unless the caller says so.
+// What a command line says of a config.
+struct ConfigArguments {
+  std::vector<std::filesystem::path> files;
+  std::vector<std::string> set;  // KEY=VALUE of each --set
+  std::string device;            // of --device; empty if it is not given
+
+  // The single keys that the command line sets, on top of the files.
+  std::vector<std::string> settings() const;
+  // The words that give another command the same config.
+  std::vector<std::string> words() const;
+};
+
+// -c,--config: one or more files that exist, and --set KEY=VALUE. Returns the first, which is not required
+// unless the caller says so.
 CLI::Option* config_option(
-    CLI::App& command, std::vector<std::filesystem::path>& configs,
+    CLI::App& command, ConfigArguments& config,
     const std::string& text = "JSON config file; keys of a later file replace those of an earlier one");
+// --device: the device of the config's network.
+CLI::Option* device_option(CLI::App& command, ConfigArguments& config);
 // -o,--out: a path. Not required unless the caller says so.
 CLI::Option* out_option(CLI::App& command, std::filesystem::path& out, const std::string& text);
 // -t,--threads: a number, 0 or more.

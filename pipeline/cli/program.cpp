@@ -15,6 +15,7 @@
 
 #include "manifests/file_descriptor.h"
 #include "pipeline/cli/stderr_log.h"
+#include "pipeline/cli/usage.h"
 #include "pipeline/run/errors.h"
 #include "pipeline/run/interrupt.h"
 #include "pipeline/run/version.h"
@@ -62,7 +63,7 @@ std::vector<std::pair<std::string, Command>> add_commands(CLI::App& app,
   return commands;
 }
 
-int parse_and_run(int argc, char** argv, std::span<const CommandEntry> entries) {
+int parse_and_run(std::vector<std::string> words, std::span<const CommandEntry> entries) {
   CLI::App app{
       "Builds 3D datasets of quadrupeds: it adds pseudo-3D labels (SMAL pose, shape, camera) to photographs\n"
       "that have 2D keypoints, and records for every label how it was made and why it was kept or dropped."};
@@ -76,12 +77,17 @@ int parse_and_run(int argc, char** argv, std::span<const CommandEntry> entries) 
       "  quadruped3d calibrate --config configs/sample.json --out out --write out/thresholds.json\n"
       "  quadruped3d build --config configs/sample.json --config out/thresholds.json --out out\n"
       "  quadruped3d verify out\n"
-      "`quadruped3d COMMAND --help` explains a command with examples.");
+      "`quadruped3d help COMMAND` explains a command with examples.");
   const auto commands = add_commands(app, entries);
   try {
-    app.parse(argc, argv);
+    std::reverse(words.begin(), words.end());
+    words.pop_back();  // the program's name
+    app.parse(std::move(words));
+  } catch (const CLI::Success& request) {
+    return app.exit(request);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : kUsage;
+    fmt::print(stderr, "{}", usage_message(app, error));
+    return kUsage;
   }
   for (const auto& [name, command] : commands) {
     if (app.got_subcommand(name)) return command();
@@ -101,10 +107,15 @@ CLI::App* declare(CLI::App& app, std::string_view name) {
 int run_program(int argc, char** argv, std::span<const CommandEntry> entries) {
   cv::setNumThreads(1);  // the flow graph's threads are the only ones
   run::install_interrupt_handlers();
+  const std::vector<std::string> words = with_help_expanded({argv, argv + argc});
+  if (const auto problem = unknown_command(words)) {
+    fmt::print(stderr, "{}", *problem);
+    return kUsage;
+  }
   StderrLog log;
   const run::LogTo to_stderr(log);
   try {
-    return parse_and_run(argc, argv, entries);
+    return parse_and_run(words, entries);
   } catch (const run::Interrupted&) {
     fmt::print(stderr, "stopped; run the same command to continue\n");
     return kInterrupted;

@@ -9,6 +9,7 @@
 #include "pipeline/cli/options.h"
 #include "pipeline/run/interrupt.h"
 #include "pipeline/run/progress.h"
+#include "pipeline/run/words.h"
 #include "pipeline/world/world.h"
 
 namespace q3d::pipeline::cli {
@@ -56,7 +57,7 @@ Command add_sample(CLI::App& app) {
     const world::WorldSummary summary = world::make_world(wanted);
     progress.reset();
     for (const auto& [name, count] : summary.pictures) fmt::print(stderr, "  {:<28} {:>6}\n", name, count);
-    fmt::print(stderr, "{} pictures in {}{}\n", summary.total, wanted.out.string(),
+    fmt::print(stderr, "{} in {}{}\n", run::counted(summary.total, "picture"), wanted.out.string(),
                summary.reused ? " (they existed already)" : "");
     if (arguments->json) {
       const nlohmann::ordered_json document = {

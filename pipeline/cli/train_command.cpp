@@ -13,7 +13,7 @@ namespace q3d::pipeline::cli {
 namespace {
 
 struct Arguments {
-  std::vector<std::filesystem::path> configs;
+  ConfigArguments config;
   std::string stage;
   training::TrainingOptions options;
   bool json = false;
@@ -41,7 +41,8 @@ nlohmann::ordered_json to_json(const training::TrainingSummary& summary) {
 Command add_train(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = declare(app, "train");
-  config_option(*command, arguments->configs)->required();
+  config_option(*command, arguments->config)->required();
+  device_option(*command, arguments->config);
   command->add_option("-s,--stage", arguments->stage, "name of the stage in the config, such as 1 or 3")
       ->required();
   out_option(*command, arguments->options.out, "folder of this run, for state, log and weights")->required();
@@ -57,13 +58,18 @@ Command add_train(CLI::App& app) {
       "Examples:\n"
       "  quadruped3d train --config configs/world_training.json --stage 1 --out out/stage1\n"
       "  quadruped3d train -c my.json --stage 3 -o out/stage3 --max-steps 1000\n"
+      "  quadruped3d train -c my.json --stage 3 -o out/trial --set batch=8 --set seed=2\n"
       "  torchrun --no-python --nproc-per-node 4 quadruped3d train -c my.json --stage 1 -o out/stage1\n"
       "If a run was stopped, run the same command again: it continues from the newest state and ends with\n"
-      "the same weights as a run that was never stopped. docs/training.md describes the config, the log\n"
+      "the same weights as a run that was never stopped. Training needs pose and shape priors; `quadruped3d\n"
+      "init --priors FILE` writes those of the synthetic quadruped. docs/training.md describes the config, "
+      "the log\n"
       "and the state.");
   return [arguments] {
-    const training::TrainingSummary summary = training::train(
-        training::settings::load_training_config(arguments->configs, arguments->stage), arguments->options);
+    const training::TrainingSummary summary =
+        training::train(training::settings::load_training_config(arguments->config.files, arguments->stage,
+                                                                 arguments->config.settings()),
+                        arguments->options);
     if (summary.rank != 0) return 0;  // rank 0 speaks for all
     print_summary(summary);
     if (arguments->json) fmt::print("{}\n", to_json(summary).dump());

@@ -8,6 +8,7 @@
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/options.h"
 #include "pipeline/dataset/verify.h"
+#include "pipeline/run/words.h"
 
 namespace q3d::pipeline::cli {
 namespace {
@@ -42,9 +43,11 @@ Command add_verify(CLI::App& app) {
     const dataset::VerifySummary summary = dataset::verify(arguments->dataset, arguments->quiet);
     for (const std::string& problem : summary.problems) fmt::print(stderr, "problem: {}\n", problem);
     const bool sound = summary.problems.empty();
-    fmt::print(stderr, "{}: {} shards, {} samples, {} pictures read: {}\n", summary.folder.string(),
-               summary.shards, summary.samples, summary.pictures,
-               sound ? "sound" : fmt::format("{} problems", summary.problems.size()));
+    const auto problems = static_cast<std::int64_t>(summary.problems.size());
+    fmt::print(stderr, "{}: {}, {}, {} read: {}\n", summary.folder.string(),
+               run::counted(summary.shards, "shard"), run::counted(summary.samples, "sample"),
+               run::counted(summary.pictures, "picture"),
+               sound ? "sound" : run::counted(problems, "problem"));
     if (arguments->json) {
       const nlohmann::ordered_json document = {
           {"dataset", summary.folder.string()}, {"sound", sound},

@@ -7,8 +7,10 @@
 #include <set>
 #include <string_view>
 
+#include "loaders/keypoints/builtin_topologies.h"
 #include "pipeline/config/build_settings.h"
 #include "pipeline/config/config_layers.h"
+#include "pipeline/config/device_names.h"
 #include "pipeline/config/json_fields.h"
 #include "pipeline/config/profiles.h"
 
@@ -38,10 +40,11 @@ bool is_version(std::string_view text) {
 
 // Reads the keys that only labels of one's own have: their keypoints are not known beforehand.
 void read_own_labels(JsonFields& fields, DatasetConfig& dataset) {
-  const bool is_own = dataset.format == "coco" || dataset.format == "deeplabcut";
+  const bool is_own = loaders::formats::takes_topology(dataset.format);
   for (const Setting<DatasetConfig>& setting : own_label_settings()) {
     require(is_own || fields.child(setting.key) == nullptr, fields.where(),
-            fmt::format("\"{}\" belongs to the formats \"coco\" and \"deeplabcut\", got it with \"{}\"",
+            fmt::format("\"{}\" belongs to the formats whose keypoints a topology describes (coco, "
+                        "deeplabcut, sleap, lightning_pose), got it with \"{}\"",
                         setting.key, dataset.format));
   }
   if (is_own) read_settings(fields, own_label_settings(), dataset);
@@ -84,8 +87,11 @@ std::vector<DatasetConfig> parse_datasets(const json& list, const std::string& w
 void resolve_dataset_paths(json& object, const char* key, const fs::path& folder) {
   if (!object.is_object() || !object.contains(key) || !object[key].is_array()) return;
   for (json& dataset : object[key]) {
-    for (const char* path : {"root", "topology", "curation", "body_model"})
-      resolve_path(dataset, path, folder);
+    for (const char* path : {"root", "curation", "body_model"}) resolve_path(dataset, path, folder);
+    const bool is_named = dataset.is_object() && dataset.contains("topology") &&
+                          dataset["topology"].is_string() &&
+                          loaders::keypoints::is_builtin_topology(dataset["topology"].get<std::string>());
+    if (!is_named) resolve_path(dataset, "topology", folder);
   }
 }
 
@@ -234,7 +240,7 @@ void check_names(const BuildConfig& config, const std::string& where) {
 
 }  // namespace
 
-BuildConfig parse_build_config(const json& merged, const std::string& where) {
+BuildConfig parse_build_config(const json& merged, const std::string& where, NetworkKey network_key) {
   BuildConfig config;
   const json expanded = expand_profile(merged, where);
   JsonFields fields(expanded, where);
@@ -247,8 +253,9 @@ BuildConfig parse_build_config(const json& merged, const std::string& where) {
   require(!config.datasets.empty(), where, "\"datasets\" must name at least one dataset");
   if (network != nullptr) {
     parse_object(*network, where + ": network", network_settings(), config.network);
+    require_one_device(config.network.device, where + ": network: device");
   } else {
-    require(!needs_network(config), where,
+    require(!needs_network(config) || network_key == NetworkKey::optional, where,
             "the key \"network\" is missing; a dataset of role \"pseudo\", the default, gets its labels from "
             "it. Datasets that bring theirs have the role \"truth\" or \"2d_only\"");
   }
@@ -257,9 +264,10 @@ BuildConfig parse_build_config(const json& merged, const std::string& where) {
   return config;
 }
 
-BuildConfig load_build_config(const std::vector<fs::path>& files) {
-  ConfigLayers layers = read_config_layers(files, resolve_paths);
-  BuildConfig config = parse_build_config(layers.resolved, layers.where);
+BuildConfig load_build_config(const std::vector<fs::path>& files, const std::vector<std::string>& settings,
+                              NetworkKey network_key) {
+  ConfigLayers layers = read_config_layers(files, resolve_paths, settings);
+  BuildConfig config = parse_build_config(layers.resolved, layers.where, network_key);
   config.as_written = std::move(layers.as_written);
   return config;
 }

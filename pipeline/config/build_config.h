@@ -116,9 +116,15 @@ struct BuildConfig {
   nlohmann::json as_written;   // the merged JSON, paths as the user wrote them
 };
 
+// Whether a config with pseudo labels must have the key "network". `leakage` reads no network.
+enum class NetworkKey : std::uint8_t { required, optional };
+
 // Reads the files in order; a later file's keys replace an earlier one's. Relative paths are relative to the
-// file that names them. Throws ConfigError naming file, key, got and expected.
-BuildConfig load_build_config(const std::vector<std::filesystem::path>& files);
+// file that names them. `settings` are single keys on top of the files (config_override.h). Throws
+// ConfigError naming file, key, got and expected.
+BuildConfig load_build_config(const std::vector<std::filesystem::path>& files,
+                              const std::vector<std::string>& settings = {},
+                              NetworkKey network_key = NetworkKey::required);
 
 // A list of datasets, as "datasets" holds them; paths are absolute already. Throws ConfigError.
 std::vector<DatasetConfig> parse_datasets(const nlohmann::json& list, const std::string& where);
@@ -127,7 +133,8 @@ std::vector<DatasetConfig> parse_datasets(const nlohmann::json& list, const std:
 void resolve_dataset_paths(nlohmann::json& object, const char* key, const std::filesystem::path& folder);
 
 // Checks and converts merged JSON; `where` names it in messages.
-BuildConfig parse_build_config(const nlohmann::json& json, const std::string& where);
+BuildConfig parse_build_config(const nlohmann::json& json, const std::string& where,
+                               NetworkKey network_key = NetworkKey::required);
 
 // Whether a dataset has the role `pseudo`. A build that needs no network takes no notice of `network`, `tta`,
 // `filter` and `guards`.

@@ -73,8 +73,10 @@ const Settings<DatasetConfig>& dataset_settings() {
        .member = &DatasetConfig::format,
        .description =
            "`prima` (Animal3D, CtrlAni3D and every set in the same JSON form), `superanimal` (COCO with 39 "
-           "keypoints), `animal_kingdom` (23 keypoints, MPII or COCO style), `coco` and `deeplabcut` (any "
-           "keypoints, described by a topology file). See docs/datasets.md",
+           "keypoints), `animal_kingdom` (23 keypoints, MPII or COCO style), `stanfordextra`, `badja`; "
+           "`coco`, "
+           "`deeplabcut`, `sleap` and `lightning_pose` (any keypoints, described by a topology). See "
+           "docs/datasets.md",
        .words = loaders::formats::dataset_formats(),
        .is_required = true},
       {.key = "root",
@@ -86,7 +88,8 @@ const Settings<DatasetConfig>& dataset_settings() {
       {.key = "annotations",
        .member = &DatasetConfig::annotations,
        .description =
-           "the annotation file, or for `deeplabcut` also a folder of such files, relative to `root`",
+           "the annotation file, or for `deeplabcut` and `badja` also a folder of such files, relative to "
+           "`root`",
        .is_required = true},
       {.key = "split", .member = &DatasetConfig::split, .description = "second part of every sample id"},
       {.key = "role",
@@ -143,7 +146,9 @@ const Settings<DatasetConfig>& own_label_settings() {
   static const Settings<DatasetConfig> kSettings{
       {.key = "topology",
        .member = &DatasetConfig::topology,
-       .description = "a file that describes the keypoints. See docs/own-labels.md",
+       .description =
+           "a file that describes the keypoints, or the name of a built-in topology such as `ap10k` "
+           "(`quadruped3d topology --list`). See docs/own-labels.md",
        .is_required = true},
       {.key = "categories",
        .member = &DatasetConfig::categories,

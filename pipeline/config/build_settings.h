@@ -8,7 +8,7 @@ namespace q3d::pipeline::config {
 
 const Settings<BuildConfig>& build_settings();      // the top level's own keys
 const Settings<DatasetConfig>& dataset_settings();  // without those of own labels
-// The keys that belong to the formats "coco" and "deeplabcut" only.
+// The keys that belong to the formats whose keypoints a topology describes.
 const Settings<DatasetConfig>& own_label_settings();
 const Settings<NetworkConfig>& network_settings();
 const Settings<TtaConfig>& tta_settings();

@@ -6,8 +6,10 @@
 
 #include "manifests/atomic_file.h"
 #include "manifests/file_descriptor.h"
-#include "pipeline/config/json_fields.h"
+#include "pipeline/config/config_override.h"
+#include "pipeline/config/json_depth.h"
 #include "pipeline/run/errors.h"
+#include "pipeline/run/words.h"
 
 namespace q3d::pipeline::config {
 namespace {
@@ -15,19 +17,10 @@ namespace {
 using nlohmann::json;
 namespace fs = std::filesystem;
 
-// Merging and printing recurse, so a file must not be able to choose how deep.
-constexpr int kMaxDepth = 32;
-
 json read_json(const fs::path& file) {
-  const auto check_depth = [&](int depth, json::parse_event_t, json&) {
-    if (depth <= kMaxDepth) return true;
-    throw run::ConfigError(
-        fmt::format("{}: got objects or lists within each other beyond {} levels, expected at "
-                    "most that",
-                    file.string(), kMaxDepth));
-  };
   try {
-    return json::parse(manifests::read_file(file), check_depth, true, /*ignore_comments=*/true);
+    return json::parse(manifests::read_file(file), refuse_depth(file.string()), true,
+                       /*ignore_comments=*/true);
   } catch (const json::exception& error) {  // also numbers beyond double, which are no parse_error
     throw run::ConfigError(fmt::format("{}: not valid JSON: {}", file.string(), error.what()));
   } catch (const manifests::IoError& error) {
@@ -39,7 +32,8 @@ json read_json(const fs::path& file) {
 }  // namespace
 
 ConfigLayers read_config_layers(const std::vector<fs::path>& files,
-                                const std::function<void(json&, const fs::path&)>& resolve_paths) {
+                                const std::function<void(json&, const fs::path&)>& resolve_paths,
+                                const std::vector<std::string>& settings) {
   ConfigLayers layers{json::object(), json::object(), {}};
   for (const fs::path& file : files) {
     json layer = read_json(file);
@@ -50,6 +44,11 @@ ConfigLayers read_config_layers(const std::vector<fs::path>& files,
     layers.resolved.merge_patch(layer);
     layers.where += (layers.where.empty() ? "" : " + ") + file.string();
   }
+  for (const std::string& setting : settings) {
+    apply_override(parse_override(setting), resolve_paths, fs::current_path(), layers.resolved,
+                   layers.as_written);
+  }
+  if (!settings.empty()) layers.where += " + --set";
   return layers;
 }
 
@@ -65,7 +64,7 @@ void require_one_of(const std::string& value, const std::vector<std::string>& kn
   std::string list;
   for (const auto& word : known) list += (list.empty() ? "" : ", ") + word;
   throw run::ConfigError(fmt::format("{}: \"{}\" is not known; expected one of: {}. Did you mean \"{}\"?",
-                                     where, value, list, nearest_word(value, known)));
+                                     where, value, list, run::nearest_word(value, known)));
 }
 
 }  // namespace q3d::pipeline::config

@@ -16,11 +16,13 @@ struct ConfigLayers {
   std::string where;          // the files' names, for messages
 };
 
-// Reads the files in order; a later file's keys replace an earlier one's. `resolve_paths` makes the paths of
-// one file absolute, given the file's folder. Throws ConfigError naming the file.
+// Reads the files in order; a later file's keys replace an earlier one's. `settings` are single keys that
+// replace those of the files (config_override.h); their paths start from the current folder. `resolve_paths`
+// makes the paths of one file absolute, given the file's folder. Throws ConfigError naming the file.
 ConfigLayers read_config_layers(
     const std::vector<std::filesystem::path>& files,
-    const std::function<void(nlohmann::json& layer, const std::filesystem::path& folder)>& resolve_paths);
+    const std::function<void(nlohmann::json& layer, const std::filesystem::path& folder)>& resolve_paths,
+    const std::vector<std::string>& settings = {});
 
 // Makes object[key] absolute where it is a text.
 void resolve_path(nlohmann::json& object, const char* key, const std::filesystem::path& folder);

@@ -2,39 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
+
+#include "pipeline/run/words.h"
 
 namespace q3d::pipeline::config {
-
-// Levenshtein distance, one row at a time.
-std::size_t edit_distance(const std::string& a, const std::string& b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), 0);
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t replaced = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
-      diagonal = row[j];
-      row[j] = std::min({row[j] + 1, row[j - 1] + 1, replaced});
-    }
-  }
-  return row.back();
-}
-
-bool is_misspelling(const std::string& a, const std::string& b) {
-  return 3 * edit_distance(a, b) <= std::max(a.size(), b.size());
-}
-
-std::string nearest_word(const std::string& word, const std::vector<std::string>& candidates) {
-  const auto nearest = std::min_element(
-      candidates.begin(), candidates.end(),
-      [&](const auto& a, const auto& b) { return edit_distance(word, a) < edit_distance(word, b); });
-  return nearest == candidates.end() ? std::string() : *nearest;
-}
 
 JsonFields::JsonFields(const nlohmann::json& object, std::string where)
     : object_(object), where_(std::move(where)) {
@@ -54,7 +27,7 @@ void JsonFields::finish() const {
   for (const auto& [key, value] : object_.items()) {
     if (known_.count(key) != 0) continue;
     problems += fmt::format("{}unknown key \"{}\"; did you mean \"{}\"?", problems.empty() ? "" : " ", key,
-                            nearest_word(key, {known_.begin(), known_.end()}));
+                            run::nearest_word(key, {known_.begin(), known_.end()}));
   }
   if (!problems.empty()) throw run::ConfigError(where_ + ": " + problems);
 }
@@ -62,7 +35,7 @@ void JsonFields::finish() const {
 void JsonFields::fail_missing(const std::string& key) const {
   std::string hint;
   for (const auto& [other, value] : object_.items()) {
-    if (other != key && known_.count(other) == 0 && is_misspelling(key, other)) {
+    if (other != key && known_.count(other) == 0 && run::is_misspelling(key, other)) {
       hint = fmt::format("; \"{}\" is not known: did you mean \"{}\"?", other, key);
     }
   }

@@ -61,12 +61,4 @@ class JsonFields {
   std::set<std::string> known_;
 };
 
-// Edits (letters added, dropped or replaced) that turn one word into the other.
-std::size_t edit_distance(const std::string& a, const std::string& b);
-// Whether the words are so near that one is probably the other misspelt: a third of the letters differ at
-// most.
-bool is_misspelling(const std::string& a, const std::string& b);
-// The candidate with the least edit distance to `word`; empty when there is none.
-std::string nearest_word(const std::string& word, const std::vector<std::string>& candidates);
-
 }  // namespace q3d::pipeline::config

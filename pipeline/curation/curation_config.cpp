@@ -131,8 +131,9 @@ CurationConfig parse_curation_config(const json& merged, const std::string& wher
   return config;
 }
 
-CurationConfig load_curation_config(const std::vector<fs::path>& files) {
-  config::ConfigLayers layers = config::read_config_layers(files, resolve_paths);
+CurationConfig load_curation_config(const std::vector<fs::path>& files,
+                                    const std::vector<std::string>& settings) {
+  config::ConfigLayers layers = config::read_config_layers(files, resolve_paths, settings);
   CurationConfig config = parse_curation_config(layers.resolved, layers.where);
   config.as_written = std::move(layers.as_written);
   return config;

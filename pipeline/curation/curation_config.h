@@ -28,8 +28,10 @@ struct CurationConfig {
 };
 
 // Reads the files in order; a later file's keys replace an earlier one's. Relative paths are relative to the
-// file that names them. Throws ConfigError naming file, key, got and expected.
-CurationConfig load_curation_config(const std::vector<std::filesystem::path>& files);
+// file that names them. `settings` are single keys on top of the files (pipeline/config/config_override.h).
+// Throws ConfigError naming file, key, got and expected.
+CurationConfig load_curation_config(const std::vector<std::filesystem::path>& files,
+                                    const std::vector<std::string>& settings = {});
 
 // Checks and converts merged JSON; `where` names it in messages.
 CurationConfig parse_curation_config(const nlohmann::json& json, const std::string& where);

@@ -6,6 +6,8 @@
 #include "pipeline/dataset/inspect.h"
 #include "pipeline/dataset/published_dataset.h"
 #include "pipeline/dataset/sentences.h"
+#include "pipeline/run/command_line.h"
+#include "pipeline/run/words.h"
 
 namespace q3d::pipeline::dataset {
 namespace {
@@ -40,7 +42,7 @@ std::string counted(std::int64_t count, std::int64_t of, std::string_view name, 
 std::string verdicts_part(const DatasetManifest& manifest) {
   using manifests::Verdict;
   const Counts& counts = manifest.counts;
-  std::string text = fmt::format("\n{} candidates\n", counts.candidates);
+  std::string text = "\n" + run::counted(counts.candidates, "candidate") + "\n";
   for (const auto& [verdict, count] :
        {std::pair{Verdict::retained, counts.retained}, std::pair{Verdict::refined, counts.refined},
         std::pair{Verdict::discarded, counts.discarded}, std::pair{Verdict::failed, counts.failed}}) {
@@ -70,7 +72,7 @@ std::string reasons_part(const DatasetManifest& manifest) {
 
 std::string labels_part(const DatasetManifest& manifest) {
   const std::int64_t kept = manifest.counts.retained + manifest.counts.refined;
-  std::string text = fmt::format("\n{} labels\n", kept);
+  std::string text = "\n" + run::counted(kept, "label") + "\n";
   for (const auto& [kind, count] : manifest.labels) {
     if (count > 0) text += counted(count, kept, manifests::to_string(kind), sentence(kind));
   }
@@ -128,9 +130,9 @@ std::string places_part(const PublishedDataset& dataset) {
   for (const ShardEntry& shard : dataset.manifest().shards) bytes += shard.bytes;
   const fs::path stages = dataset.output_folder() / "stages";
   std::string text = "\nWhere things are\n";
+  const auto files = static_cast<std::int64_t>(dataset.manifest().shards.size());
   text += line("folder", dataset.folder().string());
-  text += line("shards",
-               fmt::format("shards/, {} files, {}", dataset.manifest().shards.size(), megabytes(bytes)));
+  text += line("shards", fmt::format("shards/, {}, {}", run::counted(files, "file"), megabytes(bytes)));
   text += line("verdicts", "verdicts.csv, a line for each candidate");
   text += line("predictions", fs::is_directory(stages)
                                   ? stages.string()
@@ -138,14 +140,20 @@ std::string places_part(const PublishedDataset& dataset) {
   return text;
 }
 
+// The lines can be pasted into a shell, remarks included.
 std::string next_part(const PublishedDataset& dataset) {
-  return fmt::format(
-      "\nWhat to do next\n"
-      "  quadruped3d verify {0}\n"
-      "  quadruped3d inspect {0} --sheet sheet.png\n"
-      "  quadruped3d explain {0} ID        an ID is the first cell of a line of verdicts.csv\n"
-      "  quadruped3d inspect {0} --json    everything on this page and more, as JSON\n",
-      dataset.folder().string());
+  const std::string folder = dataset.folder().string();
+  VerdictReader verdicts(dataset.verdicts_file());
+  const auto first = verdicts.next();
+  std::string text = "\nWhat to do next\n";
+  const auto step = [&](const std::vector<std::string>& words, const char* remark) {
+    text += fmt::format("  {}{}\n", run::command_line(words), remark);
+  };
+  step({"verify", folder}, "");
+  step({"inspect", folder, "--sheet", "sheet.png"}, "");
+  if (first) step({"explain", folder, first->id}, "    # or another id of verdicts.csv, or a part of one");
+  step({"inspect", folder, "--json"}, "    # everything on this page and more, as JSON");
+  return text;
 }
 
 std::string shard_page(const fs::path& path) {
@@ -160,7 +168,9 @@ std::string shard_page(const fs::path& path) {
   if (ids.size() > kMostRows) {
     text += fmt::format("    and {} more; --json lists all of them\n", ids.size() - kMostRows);
   }
-  return text + fmt::format("next: quadruped3d inspect {} --sample ID\n", path.string());
+  if (ids.empty()) return text;
+  return text +
+         fmt::format("next: {}\n", run::command_line({"inspect", path.string(), "--sample", ids.front()}));
 }
 
 }  // namespace

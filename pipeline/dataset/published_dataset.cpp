@@ -3,12 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 #include <stdexcept>
 
 #include "manifests/digest.h"
 #include "manifests/enumerators.h"
 #include "manifests/journal.h"
-#include "pipeline/config/json_fields.h"
+#include "pipeline/run/words.h"
 #include "pipeline/stages/stage_store.h"
 #include "pipeline/unit/unit_tables.h"
 
@@ -17,22 +18,50 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Ids to propose for one that is not there: those that share the picture's name, or the first few.
+constexpr std::size_t kShownIds = 20;
+
+// The candidates that a part of an id may mean, and ids to propose if it means none.
 class NearIds {
  public:
-  explicit NearIds(const std::string& id) {
-    const std::string part = id.substr(id.rfind('/') + 1);
+  explicit NearIds(const std::string& given) : given_(given) {
+    const std::string part = given.substr(given.rfind('/') + 1);
     picture_ = part.substr(0, part.find('#'));
   }
-  void offer(const std::string& id) {
-    const bool is_near = id.find(picture_) != std::string::npos;
-    if (ids_.size() < 1000 && (is_near || ids_.size() < 10)) ids_.push_back(id);
+
+  void offer(const VerdictRow& row) {
+    if (row.id.find(given_) != std::string::npos) {
+      if (matches_++ == 0) match_ = row;
+      if (matching_ids_.size() < kShownIds) matching_ids_.push_back(row.id);
+    }
+    const bool is_near = row.id.find(picture_) != std::string::npos;
+    if (near_ids_.size() < 1000 && (is_near || near_ids_.size() < 10)) near_ids_.push_back(row.id);
   }
-  const std::vector<std::string>& ids() const { return ids_; }
+
+  // Returns the only candidate that the part fits. Throws std::runtime_error that lists the candidates if it
+  // fits several, or names the nearest if it fits none.
+  VerdictRow only_match(const fs::path& file) const {
+    if (matches_ == 1) return *match_;
+    if (matches_ > 1) {
+      const std::string more = matches_ > matching_ids_.size()
+                                   ? fmt::format("\n  and {} more", matches_ - matching_ids_.size())
+                                   : std::string();
+      throw std::runtime_error(
+          fmt::format("{}: \"{}\" is a part of the ids of {} candidates; give more of one of them:\n  {}{}",
+                      file.string(), given_, matches_, fmt::join(matching_ids_, "\n  "), more));
+    }
+    const std::string nearest = run::nearest_word(given_, near_ids_);
+    throw std::runtime_error(fmt::format("{}: no candidate has \"{}\" as its id or as a part of its id{}",
+                                         file.string(), given_,
+                                         nearest.empty() ? "" : fmt::format("; the nearest is {}", nearest)));
+  }
 
  private:
+  const std::string& given_;
   std::string picture_;
-  std::vector<std::string> ids_;
+  std::size_t matches_ = 0;
+  std::optional<VerdictRow> match_;  // the first
+  std::vector<std::string> matching_ids_;
+  std::vector<std::string> near_ids_;
 };
 
 }  // namespace
@@ -56,11 +85,9 @@ VerdictRow PublishedDataset::verdict(const std::string& id) const {
   NearIds near(id);
   while (auto row = reader.next()) {
     if (row->id == id) return std::move(*row);
-    near.offer(row->id);
+    near.offer(*row);
   }
-  const std::string nearest = config::nearest_word(id, near.ids());
-  throw std::runtime_error(fmt::format("{}: no candidate {}{}", verdicts_file().string(), id,
-                                       nearest.empty() ? "" : fmt::format("; the nearest is {}", nearest)));
+  return near.only_match(verdicts_file());
 }
 
 config::Role PublishedDataset::role(const VerdictRow& row) const {

@@ -36,8 +36,9 @@ class PublishedDataset {
   std::filesystem::path verdicts_file() const { return folder_ / "verdicts.csv"; }
   // All rows in ingest order. Throws like VerdictReader.
   std::vector<VerdictRow> verdicts() const;
-  // The row of one candidate. Throws std::runtime_error that names the nearest ids if there is none, and like
-  // VerdictReader.
+  // The row of the candidate with this id, else of the only candidate whose id contains it. Throws
+  // std::runtime_error that lists the candidates if several ids contain it, or names the nearest id if none
+  // does, and like VerdictReader.
   VerdictRow verdict(const std::string& id) const;
   config::Role role(const VerdictRow& row) const;  // throws std::runtime_error for an unknown dataset
   // Nothing unless the candidate is kept.

@@ -38,8 +38,9 @@ fs::path take_path(json& object, const char* key, const std::string& where) {
 
 }  // namespace
 
-EvaluationConfig load_evaluation_config(const std::vector<fs::path>& files, const fs::path& checkpoint) {
-  config::ConfigLayers layers = config::read_config_layers(files, resolve_paths);
+EvaluationConfig load_evaluation_config(const std::vector<fs::path>& files, const fs::path& checkpoint,
+                                        const std::vector<std::string>& settings) {
+  config::ConfigLayers layers = config::read_config_layers(files, resolve_paths, settings);
   json& build = layers.resolved;
   EvaluationConfig config;
   if (build.contains("datasets") && build["datasets"].is_array()) {

@@ -26,9 +26,11 @@ struct EvaluationConfig {
 
 // Reads the files in order; a later file's keys replace an earlier one's. Relative paths are relative to the
 // file that names them. `checkpoint`, unless empty, takes the place of network.checkpoint. A build's config
-// can be read as it is: what concerns the build alone is checked and not used. Throws ConfigError naming
-// file, key, got and expected.
+// can be read as it is: what concerns the build alone is checked and not used. `settings` are single keys on
+// top of the files (pipeline/config/config_override.h). Throws ConfigError naming file, key, got and
+// expected.
 EvaluationConfig load_evaluation_config(const std::vector<std::filesystem::path>& files,
-                                        const std::filesystem::path& checkpoint);
+                                        const std::filesystem::path& checkpoint,
+                                        const std::vector<std::string>& settings = {});
 
 }  // namespace q3d::pipeline::evaluation

@@ -23,6 +23,7 @@
 #include "model/ranks/process_group.h"
 #include "model/ranks/rank_place.h"
 #include "model/trainer.h"
+#include "pipeline/run/command_line.h"
 #include "pipeline/run/errors.h"
 #include "pipeline/run/interrupt.h"
 #include "pipeline/run/log.h"
@@ -165,6 +166,12 @@ std::string run_key(const TrainingConfig& config, const fs::path& out, bool reme
   manifests::DigestCache digests(out / "digests.txt");
   nlohmann::json assets = nlohmann::json::array();
   const TrainingNetworkConfig& network = config.network;
+  if (!fs::exists(network.priors)) {
+    throw run::ConfigError(fmt::format(
+        "{}: there is no such file, expected the pose and shape priors. `{}` writes those of the "
+        "synthetic quadruped; an official checkpoint holds its own",
+        network.priors.string(), run::command_line({"init", "--priors", network.priors.string()})));
+  }
   for (const fs::path& path : {network.initial, network.encoders, network.smal_asset, network.priors}) {
     assets.push_back(path.empty() ? std::string() : digests.digest(path));
   }

@@ -68,7 +68,14 @@ class OwnLabels(Case):
     def test_the_page_has_its_files(self):
         self.assertEqual(set(self.files), {"labeled-data/walk/CollectedData_Ada.csv", "field.json", "goats.json",
                                            "build.json"})
-        self.assertEqual(json.loads((self.shared / "exit_codes.json").read_text()), [0, 0])
+        self.assertEqual(json.loads((self.shared / "exit_codes.json").read_text()), [0, 0, 0, 0])
+
+    def test_the_draft_of_the_topology_is_the_page_s(self):
+        draft = json.loads((self.shared / "goats" / "draft.json").read_text())
+        page = json.loads(self.files["goats.json"])
+        for key in ("keypoints", "flip_pairs", "animal3d26"):
+            self.assertEqual(draft[key], page[key])
+        self.assertEqual(Image.open(self.shared / "sheet.png").size[0], 2 * 560)  # two goats
 
     def test_every_animal_is_kept(self):
         self.assertEqual(list(self.samples), [

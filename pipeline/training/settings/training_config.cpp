@@ -5,6 +5,7 @@
 #include <map>
 
 #include "pipeline/config/config_layers.h"
+#include "pipeline/config/device_names.h"
 #include "pipeline/config/json_fields.h"
 #include "pipeline/run/errors.h"
 #include "pipeline/training/settings/training_settings.h"
@@ -28,6 +29,19 @@ void parse_object(const json& object, const std::string& where, const config::Se
   config::JsonFields fields(object, where);
   config::read_settings(fields, settings, result);
   fields.finish();
+}
+
+void parse_network(const json& object, const std::string& where, TrainingNetworkConfig& network) {
+  try {
+    parse_object(object, where, training_network_settings(), network);
+  } catch (const run::ConfigError& error) {
+    if (!object.is_object() || object.contains("priors")) throw;
+    throw run::ConfigError(fmt::format(
+        "{}. `quadruped3d init --priors FILE` writes the priors of the synthetic quadruped; an official "
+        "checkpoint holds its own",
+        error.what()));
+  }
+  config::require_one_device(network.device, where + ": device");
 }
 
 Pools parse_pools(const json& object, const std::string& where) {
@@ -108,7 +122,7 @@ TrainingConfig parse_training_config(const json& merged, const std::string& wher
     if (found == nullptr) fields.fail_missing(key);
     return *found;
   };
-  parse_object(child("network"), where + ": network", training_network_settings(), config.network);
+  parse_network(child("network"), where + ": network", config.network);
   const Pools pools = parse_pools(child("pools"), where + ": pools");
   config.phases = parse_stage(child("stages"), where + ": stages", stage, pools);
   config::read_settings(fields, feed_settings(), config.feed);
@@ -123,8 +137,9 @@ TrainingConfig parse_training_config(const json& merged, const std::string& wher
   return config;
 }
 
-TrainingConfig load_training_config(const std::vector<fs::path>& files, const std::string& stage) {
-  const config::ConfigLayers layers = config::read_config_layers(files, resolve_paths);
+TrainingConfig load_training_config(const std::vector<fs::path>& files, const std::string& stage,
+                                    const std::vector<std::string>& settings) {
+  const config::ConfigLayers layers = config::read_config_layers(files, resolve_paths, settings);
   return parse_training_config(layers.resolved, layers.where, stage);
 }
 

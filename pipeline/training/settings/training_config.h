@@ -64,10 +64,10 @@ struct TrainingConfig {
 };
 
 // Reads the files in order; a later file's keys replace an earlier one's. Relative paths are relative to the
-// file that names them. Keeps the phases of `stage` ("1", "3"). Throws ConfigError naming file, key, got and
-// expected.
-TrainingConfig load_training_config(const std::vector<std::filesystem::path>& files,
-                                    const std::string& stage);
+// file that names them. Keeps the phases of `stage` ("1", "3"). `settings` are single keys on top of the
+// files (pipeline/config/config_override.h). Throws ConfigError naming file, key, got and expected.
+TrainingConfig load_training_config(const std::vector<std::filesystem::path>& files, const std::string& stage,
+                                    const std::vector<std::string>& settings = {});
 
 // Checks and converts merged JSON; `where` names it in messages.
 TrainingConfig parse_training_config(const nlohmann::json& json, const std::string& where,

@@ -128,8 +128,10 @@ const Settings<TrainingNetworkConfig>& training_network_settings() {
        .is_required = true},
       {.key = "priors",
        .member = &Config::priors,
-       .description = "path of a safetensors file with `pose_prior_loss.*` and `shape_prior_loss.*`; an "
-                      "official checkpoint holds them too",
+       .description =
+           "path of a safetensors file with `pose_prior_loss.*` and `shape_prior_loss.*`; an "
+           "official checkpoint holds them too, and `quadruped3d init --priors FILE` writes those of "
+           "the synthetic quadruped",
        .is_required = true},
       {.key = "device",
        .member = &Config::device,

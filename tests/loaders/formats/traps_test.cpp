@@ -325,6 +325,21 @@ TEST(Traps, trap_16_betas_in_one_list_or_two_or_the_first_alone) {
   EXPECT_THAT(joined(dataset.notes), HasSubstr("shape_extra is missing"));
 }
 
+TEST(Traps, betas_of_another_body_model_are_no_label_and_the_pose_is) {
+  const Folder folder;
+  json other = prima_record();
+  other.erase("shape_extra");
+  other["shape"] = std::vector<double>(145, 0.5);
+  const Dataset dataset = folder.load_prima({other, prima_record()});
+  ASSERT_EQ(dataset.records[0].failure, Reason::none) << dataset.records[0].failure_detail;
+  EXPECT_FALSE(dataset.records[0].truth->has_betas);
+  EXPECT_TRUE(dataset.records[0].truth->has_pose);
+  EXPECT_EQ(dataset.records[0].truth->pose_axis_angle[5], 0.1F);
+  EXPECT_EQ(dataset.records[0].keypoints[0].weight, 1.0F);
+  EXPECT_TRUE(dataset.records[1].truth->has_betas);
+  EXPECT_THAT(joined(dataset.notes), HasSubstr("shape has 145 numbers"));
+}
+
 TEST(Traps, trap_17_zeros_are_no_truth_and_single_zeros_do_not_undo_it) {
   const Folder folder;
   json zeros = prima_record();

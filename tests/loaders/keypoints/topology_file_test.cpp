@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "loaders/keypoints/builtin_topologies.h"
 #include "tests/loaders/formats/annotation_files.h"
 
 namespace q3d::loaders::keypoints {
@@ -18,7 +19,8 @@ Topology shipped(const std::string& file) {
 }
 
 std::vector<std::string> shipped_files() {
-  return {"acinoset", "animalpose", "animalpose_mmpose", "ap10k", "stanfordextra", "superanimal_quadruped"};
+  return {"acinoset", "animal3d", "animalpose", "animalpose_mmpose", "ap10k",
+          "atrw",     "badja",    "horse10",    "stanfordextra",     "superanimal_quadruped"};
 }
 
 std::string name_of_source(const Topology& topology, std::size_t keypoint) {
@@ -38,6 +40,58 @@ TEST(TopologyFile, all_that_are_shipped_can_be_read_and_mirror_in_pairs) {
       EXPECT_EQ(each.flip[static_cast<std::size_t>(each.flip[i])], static_cast<int>(i)) << file;
     }
   }
+}
+
+TEST(TopologyFile, shipped_ones_go_by_name_from_any_folder) {
+  for (const std::string& name : shipped_files()) {
+    EXPECT_TRUE(is_builtin_topology(name));
+    const Topology named = read_topology_file(name);
+    const Topology file = shipped(name);
+    EXPECT_EQ(named.keypoints, file.keypoints) << name;
+    EXPECT_EQ(named.source, file.source) << name;
+    EXPECT_EQ(named.flip, file.flip) << name;
+    EXPECT_EQ(named.weights, file.weights) << name;
+  }
+  EXPECT_FALSE(is_builtin_topology("./ap10k"));
+  EXPECT_FALSE(is_builtin_topology("ap10k.json"));
+}
+
+TEST(TopologyFile, a_name_that_is_neither_file_nor_built_in_lists_the_built_in_ones) {
+  try {
+    read_topology_file("ap11k");
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("ap11k: there is no such file"));
+    EXPECT_THAT(error.what(), HasSubstr("animalpose_mmpose, ap10k, atrw"));
+  }
+}
+
+// The table of SMALify, by the authors of BADJA: for each of StanfordExtra's 24 points the index of BADJA's,
+// or -1. It has the paws first and the left side first.
+TEST(TopologyFile, badja_has_the_sides_of_its_authors_table) {
+  const std::vector<int> smalify{14, 13, 12, 24, 23, 22, 10, 9,  8,  20, 19, 18,
+                                 25, 31, -1, -1, 33, -1, 36, 35, -1, -1, -1, 15};
+  const Topology badja = shipped("badja");
+  const Topology stanford = shipped("stanfordextra");
+  const std::vector<std::string>& names = topology("animal3d26").keypoints;
+  int compared = 0;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (badja.source[i] < 0 || stanford.source[i] < 0) continue;
+    const int theirs = smalify.at(static_cast<std::size_t>(stanford.source[i]));
+    if (theirs < 0) continue;  // a point that SMALify does not take from BADJA
+    EXPECT_EQ(badja.source[i], theirs) << names[i];
+    ++compared;
+  }
+  EXPECT_EQ(compared, 15);  // three joints of four legs, both ends of the tail, the nose
+}
+
+TEST(TopologyFile, horse10_near_is_left_and_unsided_points_are_left_out) {
+  const Topology horse = shipped("horse10");
+  EXPECT_EQ(name_of_source(horse, 3), "Nearfrontfoot");  // left_front_paw
+  EXPECT_EQ(name_of_source(horse, 6), "Offhindfoot");    // right_back_paw
+  EXPECT_EQ(name_of_source(horse, 16), "Nearhindhock");  // left_back_knee
+  EXPECT_EQ(horse.source[0], -1);                        // "Eye" has no side
+  EXPECT_EQ(horse.source[10], -1);                       // nor has "Stifle"
 }
 
 TEST(TopologyFile, superanimal_is_that_of_its_own_format) {

@@ -141,7 +141,8 @@ TEST(BuildConfig, RefusesWhatLabelsOfOnesOwnCannotHave) {
   EXPECT_NE(refusal("topology", nullptr).find("\"topology\" is missing"), std::string::npos);
   EXPECT_NE(refusal("min_confidence", 1.5).find("must be 0 to 1"), std::string::npos);
   EXPECT_NE(refusal("box_margin", -1).find("must be 0 to 2"), std::string::npos);
-  EXPECT_NE(refusal("format", "superanimal").find("\"topology\" belongs to the formats"), std::string::npos);
+  EXPECT_NE(refusal("format", "superanimal").find("\"topology\" belongs to the formats whose keypoints"),
+            std::string::npos);
   EXPECT_NE(refusal("min_confidense", 0.5).find("did you mean \"min_confidence\""), std::string::npos);
 }
 

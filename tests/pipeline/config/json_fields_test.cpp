@@ -72,10 +72,5 @@ TEST(JsonFields, MissingRequiredKeyAndWrongContainer) {
   EXPECT_EQ(message_of([&] { JsonFields(list, "f"); }), "f: expected a JSON object, got array");
 }
 
-TEST(NearestWord, ByEditDistance) {
-  EXPECT_EQ(nearest_word("superanmal", {"prima", "superanimal", "coco"}), "superanimal");
-  EXPECT_EQ(nearest_word("anything", {}), "");
-}
-
 }  // namespace
 }  // namespace q3d::pipeline::config

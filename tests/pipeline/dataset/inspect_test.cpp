@@ -38,7 +38,7 @@ TEST_F(Inspect, ThePageHasCountsReasonsGroupsThresholdsAndPlaces) {
   EXPECT_THAT(text, HasSubstr("  bovidae                           1        0    0.0 %\n"));
   EXPECT_THAT(text, HasSubstr("pool: tau_low 0.0400, tau_high 0.0800, delta 0.05"));
   EXPECT_THAT(text, HasSubstr("checkpoint with SHA-256 cccc"));
-  EXPECT_THAT(text, HasSubstr("quadruped3d verify " + version_.string()));
+  EXPECT_THAT(text, HasSubstr(" verify " + version_.string()));
 }
 
 TEST_F(Inspect, AShardAndASampleHavePagesToo) {

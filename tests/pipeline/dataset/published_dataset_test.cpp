@@ -112,8 +112,20 @@ TEST_F(Published, KnowsRoleLabelAndPlaceOfACandidate) {
   const VerdictRow dropped = dataset.verdict("pool/test/c.jpg#2");
   EXPECT_EQ(dataset.role(dropped), config::Role::pseudo);
   EXPECT_EQ(dataset.label_kind(dropped), std::nullopt);
-  EXPECT_THAT(message([&] { dataset.verdict("zoo/train/d.jpg#4"); }),
-              HasSubstr("no candidate zoo/train/d.jpg#4; the nearest is zoo/train/d.jpg#3"));
+  EXPECT_THAT(
+      message([&] { dataset.verdict("zoo/train/d.jpg#4"); }),
+      HasSubstr("no candidate has \"zoo/train/d.jpg#4\" as its id or as a part of its id; the nearest is "
+                "zoo/train/d.jpg#3"));
+}
+
+TEST_F(Published, FindsACandidateByAPartOfItsId) {
+  const PublishedDataset dataset(version_);
+  EXPECT_EQ(dataset.verdict("d.jpg").id, "zoo/train/d.jpg#3");
+  EXPECT_EQ(dataset.verdict("test/c").id, "pool/test/c.jpg#2");
+  const std::string several = message([&] { dataset.verdict(".jpg#"); });
+  EXPECT_THAT(several, HasSubstr("\".jpg#\" is a part of the ids of 4 candidates"));
+  EXPECT_THAT(several, HasSubstr("\n  pool/test/c.jpg#2"));
+  EXPECT_THAT(several, HasSubstr("\n  zoo/train/d.jpg#3"));
 }
 
 TEST_F(Published, RefusesNamesThatItDoesNotKnow) {

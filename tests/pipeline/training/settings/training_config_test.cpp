@@ -143,6 +143,27 @@ TEST(TrainingConfig, AMissingPartIsNamed) {
   }
 }
 
+TEST(TrainingConfig, MissingPriorsNameTheCommandThatWritesThem) {
+  json config = good();
+  config["network"].erase("priors");
+  try {
+    parse_training_config(config, "t", "1");
+    FAIL();
+  } catch (const run::ConfigError& error) {
+    EXPECT_NE(std::string(error.what()).find("quadruped3d init --priors FILE"), std::string::npos)
+        << error.what();
+  }
+}
+
+TEST(TrainingConfig, SingleKeysAreSetOnTopOfTheFiles) {
+  const testing::ScratchDir scratch;
+  std::ofstream(scratch.path() / "t.json") << good().dump();
+  const TrainingConfig config =
+      load_training_config({scratch.path() / "t.json"}, "1", {"seed=9", "pools.animal3d.shards.0=x"});
+  EXPECT_EQ(config.seed, 9U);
+  EXPECT_EQ(config.phases[0].pools[0].shards[0], std::filesystem::current_path() / "x");
+}
+
 TEST(TrainingConfig, PathsAreRelativeToTheirFile) {
   const testing::ScratchDir scratch;
   std::filesystem::create_directories(scratch.path() / "layer");
