@@ -9,6 +9,7 @@
 #include "manifests/checked_line.h"
 #include "manifests/digest.h"
 #include "manifests/file_descriptor.h"
+#include "manifests/known_files.h"
 
 namespace q3d::manifests {
 namespace {
@@ -49,11 +50,18 @@ bool parse(std::string_view text, Integer& value) {
   return error == std::errc() && end == text.data() + text.size();
 }
 
-}  // namespace
+// One line of the cache's file.
+struct CachedDigest {
+  std::string sha256;
+  FileState state;
+  std::string path;
+};
 
-DigestCache::DigestCache(std::filesystem::path file) : file_(std::move(file)) {
-  if (!std::filesystem::exists(file_)) return;
-  const std::string content = read_file(file_);
+// Calls `take` for every sound line of the file; none if there is no such file.
+template <typename Take>
+void read_cached(const std::filesystem::path& file, Take&& take) {
+  if (!std::filesystem::exists(file)) return;
+  const std::string content = read_file(file);
   std::string_view rest = content;
   while (!rest.empty()) {
     const std::size_t end = std::min(rest.find('\n'), rest.size());
@@ -61,14 +69,31 @@ DigestCache::DigestCache(std::filesystem::path file) : file_(std::move(file)) {
     rest.remove_prefix(std::min(end + 1, rest.size()));
     if (!payload) continue;
     std::string_view fields = *payload;
-    Entry entry;
-    entry.sha256 = next_field(fields);
-    if (entry.sha256.size() == 64 && parse(next_field(fields), entry.size) &&
-        parse(next_field(fields), entry.mtime_ns) && parse(next_field(fields), entry.inode) &&
+    CachedDigest line;
+    line.sha256 = next_field(fields);
+    if (line.sha256.size() == 64 && parse(next_field(fields), line.state.size) &&
+        parse(next_field(fields), line.state.mtime_ns) && parse(next_field(fields), line.state.inode) &&
         !fields.empty()) {
-      entries_.insert_or_assign(std::string(fields), std::move(entry));
+      line.path = fields;
+      take(std::move(line));
     }
   }
+}
+
+}  // namespace
+
+DigestCache::DigestCache(std::filesystem::path file) : file_(std::move(file)) {
+  read_cached(file_, [this](CachedDigest line) {
+    entries_.insert_or_assign(std::move(line.path), Entry{line.state.size, line.state.mtime_ns,
+                                                          line.state.inode, std::move(line.sha256)});
+  });
+}
+
+std::multimap<std::string, std::filesystem::path> read_known_files(const std::filesystem::path& digests) {
+  std::multimap<std::string, std::filesystem::path> files;
+  read_cached(digests,
+              [&](CachedDigest line) { files.emplace(std::move(line.sha256), std::move(line.path)); });
+  return files;
 }
 
 std::string DigestCache::digest(const std::filesystem::path& path) {

@@ -14,14 +14,18 @@ namespace q3d::pipeline::cli {
 
 struct CommandInfo {
   std::string_view name;
-  std::string_view description;  // one line of `quadruped3d --help`
-  bool needs_network;            // links LibTorch, and is therefore in the program quadruped3d-network
+  std::string_view description;       // one line of `quadruped3d --help`
+  bool needs_network;                 // links LibTorch, and is therefore in the program quadruped3d-network
+  std::string_view network_option{};  // with this option, the command runs there too
 };
-inline constexpr std::array<CommandInfo, 16> kCommands{{
+inline constexpr std::array<CommandInfo, 18> kCommands{{
     {"build", "make a versioned dataset of labels from annotated photographs", true},
     {"calibrate", "find the thresholds that give the wanted shares of labels", true},
     {"verify", "read a whole dataset and check every byte of it", false},
-    {"inspect", "show what a dataset or a shard contains, as text or as a picture", false},
+    {"inspect", "show what a dataset or a shard contains, as text or as a picture", false, "--sheet"},
+    {"overlay", "draw predictions and labels as meshes over their photographs, or write them as 3D files",
+     true},
+    {"report", "write a page that shows a whole dataset, and its numbers as JSON", true},
     {"sample", "render pictures of quadrupeds with known 3D truth, in the layouts of public datasets", true},
     {"init", "write an untrained checkpoint, or the synthetic body model and its priors", true},
     {"train", "train a network from shards", true},
@@ -48,6 +52,9 @@ Command add_build(CLI::App& app);
 Command add_calibrate(CLI::App& app);
 Command add_verify(CLI::App& app);
 Command add_inspect(CLI::App& app);
+Command add_inspect_with_sheets(CLI::App& app);  // of quadruped3d-network, which can pose bodies
+Command add_overlay(CLI::App& app);
+Command add_report(CLI::App& app);
 Command add_explain(CLI::App& app);
 Command add_leakage(CLI::App& app);
 Command add_init(CLI::App& app);

@@ -2,6 +2,7 @@
 // start at once; the others run in quadruped3d-network, which links LibTorch.
 
 #include <array>
+#include <span>
 #include <string_view>
 
 #include "pipeline/cli/network_program.h"
@@ -10,8 +11,11 @@
 int main(int argc, char** argv) {
   namespace cli = q3d::pipeline::cli;
   // `help COMMAND` is answered where the command is.
-  const int command = argc > 2 && std::string_view(argv[1]) == "help" ? 2 : 1;
-  if (argc > command && cli::needs_network(argv[command])) return cli::become_network_program(argv);
+  const std::size_t command = argc > 2 && std::string_view(argv[1]) == "help" ? 2 : 1;
+  const auto words = std::span(argv, static_cast<std::size_t>(argc));
+  if (words.size() > command && cli::needs_network(words.subspan(command))) {
+    return cli::become_network_program(argv);
+  }
   constexpr std::array<cli::CommandEntry, 7> kEntries{{
       {"verify", cli::add_verify},
       {"inspect", cli::add_inspect},

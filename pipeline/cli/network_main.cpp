@@ -8,9 +8,12 @@
 int main(int argc, char** argv) {
   namespace cli = q3d::pipeline::cli;
   if (!cli::waiting_is_decided()) return cli::start_again_passively(argv);
-  constexpr std::array<cli::CommandEntry, 9> kEntries{{
+  constexpr std::array<cli::CommandEntry, 12> kEntries{{
       {"build", cli::add_build},
       {"calibrate", cli::add_calibrate},
+      {"inspect", cli::add_inspect_with_sheets},
+      {"overlay", cli::add_overlay},
+      {"report", cli::add_report},
       {"sample", cli::add_sample},
       {"init", cli::add_init},
       {"train", cli::add_train},

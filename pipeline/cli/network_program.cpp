@@ -10,6 +10,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <string_view>
 #include <system_error>
 
 #include "pipeline/cli/commands.h"
@@ -48,9 +49,16 @@ int start(const fs::path& program, char** argv) {
 
 }  // namespace
 
-bool needs_network(std::string_view command) {
-  return std::any_of(kCommands.begin(), kCommands.end(),
-                     [&](const CommandInfo& info) { return info.name == command && info.needs_network; });
+bool needs_network(std::span<char* const> arguments) {
+  if (arguments.empty()) return false;
+  const std::string_view command = arguments.front();
+  const auto info = std::find_if(kCommands.begin(), kCommands.end(),
+                                 [&](const CommandInfo& each) { return each.name == command; });
+  if (info == kCommands.end() || info->needs_network) return info != kCommands.end();
+  return !info->network_option.empty() &&
+         std::any_of(arguments.begin() + 1, arguments.end(), [&](const char* word) {
+           return std::string_view(word).substr(0, std::string_view(word).find('=')) == info->network_option;
+         });
 }
 
 bool waiting_is_decided() {

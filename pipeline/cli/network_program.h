@@ -6,12 +6,13 @@
 // LibTorch starts.
 #pragma once
 
-#include <string_view>
+#include <span>
 
 namespace q3d::pipeline::cli {
 
-// Whether kCommands says that this command needs the network's program.
-bool needs_network(std::string_view command);
+// Whether kCommands says that this command line needs the network's program. `arguments` are the program's
+// own, without its name.
+bool needs_network(std::span<char* const> arguments);
 
 // Makes OpenMP's threads wait passively unless the user's environment says how they wait (OMP_WAIT_POLICY or
 // GOMP_SPINCOUNT), and replaces this process by quadruped3d-network with the same arguments. The process

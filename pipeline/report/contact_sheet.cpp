@@ -2,102 +2,99 @@
 
 #include <fmt/format.h>
 
-#include <opencv2/imgproc.hpp>
-
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
-#include "loaders/pictures/crop.h"
 #include "loaders/pictures/encode.h"
-#include "loaders/pictures/stored_crop.h"
 #include "manifests/atomic_file.h"
-#include "pipeline/unit/annotated_body.h"
+#include "pipeline/dataset/inspect.h"
+#include "pipeline/report/keypoint_painter.h"
+#include "pipeline/report/lettering.h"
+#include "pipeline/report/overlay_painter.h"
+#include "pipeline/report/overlay_run.h"
+#include "pipeline/run/log.h"
 #include "pipeline/unit/crop_keypoints.h"
 
 namespace q3d::pipeline::report {
 namespace {
 
-constexpr int kTilePx = loaders::pictures::kPatchSidePx;
-constexpr int kCaptionPx = 34;
-const cv::Scalar kAnnotated(60, 220, 60);
-const cv::Scalar kProjected(255, 60, 60);
-const cv::Scalar kPaper(24, 24, 24);
-const cv::Scalar kInk(235, 235, 235);
+namespace fs = std::filesystem;
 
-// The network's crop, cut out of the stored crop.
-cv::Mat network_crop(const manifests::ShardSample& sample) {
-  const cv::Mat stored = loaders::pictures::decode_stored(sample.crop, 3);
-  const auto& [center_x, center_y, side] = sample.patch_box;
-  const loaders::pictures::Affine from_image =
-      loaders::pictures::patch_from_image({center_x, center_y, side}, kTilePx);
-  return loaders::pictures::warp_patch(
-             stored, {}, loaders::pictures::patch_from_stored_crop(from_image, sample.crop_from_image))
-      .rgb;
+constexpr int kTilePx = 260;
+
+// A shard lies in the folder `shards` of its dataset, unless somebody moved it.
+fs::path dataset_of(const fs::path& path) {
+  return fs::is_directory(path) ? path : fs::absolute(path).parent_path().parent_path();
 }
 
-cv::Point to_tile(float x, float y) {
-  return {cvRound((x + 0.5) * kTilePx), cvRound((y + 0.5) * kTilePx)};
-}
-
-void draw_keypoints(cv::Mat& tile, const manifests::ShardSample& sample) {
-  const device::CropKeypoints annotated = unit::crop_keypoints(sample.record);
-  const bool has_body = unit::has_projection(sample.projected_2d);
-  for (std::size_t k = 0; k < manifests::kNumKeypoints; ++k) {
-    const cv::Point point = to_tile(annotated[k].x, annotated[k].y);
-    const bool visible = annotated[k].is_visible();
-    if (visible) cv::circle(tile, point, 3, kAnnotated, cv::FILLED, cv::LINE_AA);
-    if (!has_body) continue;
-    const cv::Point projected = to_tile(sample.projected_2d[k].x, sample.projected_2d[k].y);
-    if (visible) cv::line(tile, point, projected, kProjected, 1, cv::LINE_AA);
-    cv::drawMarker(tile, projected, kProjected, cv::MARKER_TILTED_CROSS, 6, 1, cv::LINE_AA);
+// Null where no body model is found; a note says why.
+std::unique_ptr<device::BodyMeshes> bodies_for(const SheetOptions& options,
+                                               const device::BodyMeshesLoader& load_bodies) {
+  if (!options.body.empty() && !fs::is_directory(options.path)) return load_bodies(options.body);
+  const fs::path folder = dataset_of(options.path);
+  try {
+    if (!fs::is_directory(options.path) && !fs::exists(folder / "dataset.json")) {
+      throw MissingBodyModel("the shard lies in no dataset that names one; give --body FILE");
+    }
+    const dataset::PublishedDataset dataset(folder);
+    const SourceFiles files(dataset.output_folder(), {});
+    return load_bodies(find_body_model(dataset, files, options.body));
+  } catch (const MissingBodyModel& error) {
+    run::log_note(fmt::format("the sheet shows keypoints without meshes: {}", error.what()));
+    return nullptr;
   }
 }
 
-void draw_caption(cv::Mat& cell, const manifests::ShardSample& sample) {
-  const auto write = [&](const std::string& text, int line) {
-    cv::putText(cell, text, {4, kTilePx + 13 + 15 * line}, cv::FONT_HERSHEY_SIMPLEX, 0.38, kInk, 1,
-                cv::LINE_AA);
-  };
-  const std::string& id = sample.record.id;
-  write(id.size() <= 40 ? id : "..." + id.substr(id.size() - 37), 0);
+cv::Mat tile(const OverlaySubject& subject, const OverlayPainter& painter) {
+  cv::Mat picture = photo_tile(subject, kTilePx);
+  if (const auto label = painter.pose(subject).label) painter.draw_body(picture, *label, colours::kOrange);
+  draw_keypoints(picture, unit::crop_keypoints(subject.record),
+                 subject.label ? &subject.label->keypoints_2d : nullptr, kPanelContext, 0);
+  return picture;
+}
+
+std::string error_line(const manifests::ShardSample& sample) {
   const manifests::Judgement& judgement = sample.judgement;
-  std::string label(manifests::to_string(sample.label_kind));
-  if (!std::isnan(judgement.initial_error)) {
-    label += fmt::format("  L {:.3f} -> {:.3f}", judgement.initial_error, judgement.final_error);
-  } else if (!std::isnan(judgement.final_error)) {
-    label += fmt::format("  L {:.3f}", judgement.final_error);
+  std::string text(manifests::to_string(sample.label_kind));
+  if (std::isfinite(judgement.initial_error)) {
+    text += fmt::format("  L_proj {:.3f}", judgement.initial_error);
+    if (judgement.iterations > 0) text += fmt::format(" -> {:.3f}", judgement.final_error);
+  } else if (std::isfinite(judgement.final_error)) {
+    text += fmt::format("  L_proj {:.3f}", judgement.final_error);
   }
-  write(label, 1);
+  return text;
+}
+
+cv::Mat cell(const manifests::ShardSample& sample, const OverlayPainter& painter) {
+  const OverlaySubject subject = subject_of(sample);
+  std::vector<std::string> lines = wrapped(subject.row.id, kTilePx, TextSize::small);
+  lines.push_back(error_line(sample));
+  const int step = line_height_px(TextSize::small);
+  cv::Mat picture(kTilePx + step * static_cast<int>(lines.size()), kTilePx, CV_8UC3, colours::kPaper);
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    write(picture, lines[i], {0, step * static_cast<int>(i)}, TextSize::small);
+  }
+  tile(subject, painter).copyTo(picture(cv::Rect(0, picture.rows - kTilePx, kTilePx, kTilePx)));
+  return picture;
 }
 
 }  // namespace
 
-void write_contact_sheet(const std::filesystem::path& path,
-                         const std::vector<manifests::ShardSample>& samples, int columns) {
-  std::vector<const manifests::ShardSample*> drawn;
-  for (const auto& sample : samples) {
-    if (!sample.crop.empty()) drawn.push_back(&sample);
-  }
-  if (drawn.empty()) {
+void write_contact_sheet(const SheetOptions& options, const device::BodyMeshesLoader& load_bodies) {
+  std::vector<manifests::ShardSample> samples = dataset::spread_samples(options.path, options.count);
+  std::erase_if(samples, [](const manifests::ShardSample& sample) { return sample.crop.empty(); });
+  if (samples.empty()) {
     throw std::runtime_error(
-        "there is no picture to draw: the shards hold no samples, or refer to images only");
+        "there is no picture to draw: the shards hold no samples, or refer to images only; `quadruped3d "
+        "overlay` draws these from the source pictures");
   }
-  const int across = std::min(columns, static_cast<int>(drawn.size()));
-  const int down = (static_cast<int>(drawn.size()) + across - 1) / across;
-  cv::Mat sheet(down * (kTilePx + kCaptionPx), across * kTilePx, CV_8UC3, kPaper);
-  for (std::size_t i = 0; i < drawn.size(); ++i) {
-    const int column = static_cast<int>(i) % across;
-    const int row = static_cast<int>(i) / across;
-    cv::Mat cell =
-        sheet(cv::Rect(column * kTilePx, row * (kTilePx + kCaptionPx), kTilePx, kTilePx + kCaptionPx));
-    cv::Mat tile = cell(cv::Rect(0, 0, kTilePx, kTilePx));
-    network_crop(*drawn[i]).copyTo(tile);
-    draw_keypoints(tile, *drawn[i]);
-    draw_caption(cell, *drawn[i]);
-  }
-  const std::vector<std::byte> png = loaders::pictures::encode_png(sheet);
-  manifests::write_file_atomically(path, {reinterpret_cast<const char*>(png.data()), png.size()});
+  const std::unique_ptr<device::BodyMeshes> bodies = bodies_for(options, load_bodies);
+  const OverlayPainter painter(bodies.get());
+  std::vector<cv::Mat> cells;
+  for (const manifests::ShardSample& sample : samples) cells.push_back(cell(sample, painter));
+  const std::vector<std::byte> png = loaders::pictures::encode_png(overlay_sheet(cells, options.columns));
+  manifests::write_file_atomically(options.out, std::span(png));
 }
 
 }  // namespace q3d::pipeline::report

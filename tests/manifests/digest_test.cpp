@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "manifests/atomic_file.h"
+#include "manifests/known_files.h"
 #include "tests/support/paths.h"
 
 namespace q3d::manifests {
@@ -97,6 +98,22 @@ TEST_F(DigestCacheTest, DoesNotTrustAFileModifiedJustBefore) {
   EXPECT_EQ(cache.digest(file_), kAbc);
   change_unnoticed(file_, "xyz");
   EXPECT_EQ(cache.digest(file_), sha256(std::string_view("xyz")));
+}
+
+TEST_F(DigestCacheTest, SaysWhereFilesLie) {
+  const fs::path one = scratch_.path() / "one", same = scratch_.path() / "a name with spaces";
+  write(one, "abc");
+  write(same, "abc");
+  DigestCache cache(cache_file_);
+  cache.digest(one);
+  cache.digest(same);
+  cache.save();
+  const auto files = read_known_files(cache_file_);
+  const auto [first, last] = files.equal_range(std::string(kAbc));
+  std::vector<fs::path> paths;
+  for (auto file = first; file != last; ++file) paths.push_back(file->second);
+  EXPECT_THAT(paths, ::testing::UnorderedElementsAre(one, same));
+  EXPECT_TRUE(read_known_files(scratch_.path() / "absent").empty());
 }
 
 TEST_F(DigestCacheTest, DropsDamagedLinesOnly) {

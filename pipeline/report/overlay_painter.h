@@ -1,0 +1,83 @@
+// Overlays: the bodies of one candidate drawn over its photograph, panel beside panel.
+#pragma once
+
+#include <opencv2/core.hpp>
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "pipeline/device/body_meshes.h"
+#include "pipeline/report/mesh_painter.h"
+#include "pipeline/report/overlay_subject.h"
+
+namespace q3d::pipeline::report {
+
+enum class Panel : std::uint8_t {
+  photo,
+  prediction,  // the network's body over the photo, blue
+  label,       // the dataset's body over the photo, orange; the dropped one of a candidate that was adapted
+  side,        // the body that decided, seen from the side
+  keypoints,   // annotated keypoints and the projections of the body that decided
+};
+inline constexpr std::array<Panel, 5> kAllPanels{Panel::photo, Panel::prediction, Panel::label, Panel::side,
+                                                 Panel::keypoints};
+std::string_view to_string(Panel panel);
+Panel panel_from_string(std::string_view name);  // throws std::invalid_argument on an unknown name
+
+// Panels are square and show this many times the network's crop, so that a box which cuts the animal is seen.
+inline constexpr double kPanelContext = 1.2;
+inline constexpr int kPanelSidePx = 300;
+
+// The photograph in a square tile that shows kPanelContext times the crop. Grey with the reason where there
+// is no picture.
+cv::Mat photo_tile(const OverlaySubject& subject, int side_px);
+
+// The posed meshes of one subject, in the frame of its crop's camera.
+struct PosedBodies {
+  std::optional<Vertices> prediction;
+  std::optional<Vertices> label;  // or the dropped body
+  const Vertices* shown() const;  // the label, else the prediction; null where there is none
+};
+
+class OverlayPainter {
+ public:
+  // Without a body model (null) no body is drawn, and the panels say so. `bodies` must outlive the painter.
+  explicit OverlayPainter(const device::BodyMeshes* bodies);
+
+  PosedBodies pose(const OverlaySubject& subject) const;
+
+  // One square panel, 8-bit RGB. A panel that has nothing to show is grey and says why.
+  cv::Mat panel(const OverlaySubject& subject, const PosedBodies& bodies, Panel panel,
+                int side_px = kPanelSidePx) const;
+  // The panels side by side, without text.
+  cv::Mat row(const OverlaySubject& subject, std::span<const Panel> panels, int side_px = kPanelSidePx) const;
+  // The row with the panels' titles above it, and above these the whole id, the verdict and its numbers, and
+  // what decided.
+  cv::Mat captioned(const OverlaySubject& subject, std::span<const Panel> panels) const;
+
+  // Draws a body into a tile that photo_tile has made.
+  void draw_body(cv::Mat& tile, const Vertices& vertices, const cv::Scalar& colour) const;
+  const std::vector<std::array<std::int32_t, 3>>& faces() const { return faces_; }
+
+ private:
+  const device::BodyMeshes* bodies_;
+  std::vector<std::array<std::int32_t, 3>> faces_;
+  MeshPainter painter_;
+};
+
+// What the colours mean, in one strip of this width.
+cv::Mat overlay_legend(int width_px);
+
+// The pictures below each other or in `columns` columns, on paper, each as wide as the widest, and the legend
+// at the end. Throws std::invalid_argument where there are none.
+cv::Mat overlay_sheet(const std::vector<cv::Mat>& pictures, int columns);
+
+// "discarded (gain_too_small): lion, felidae; L_proj 0.061 -> 0.055, gain 3.1 %": the verdict in one line.
+std::string verdict_line(const dataset::VerdictRow& row);
+
+}  // namespace q3d::pipeline::report

@@ -1,0 +1,32 @@
+// The pictures of the report: candidates worth looking at, with their stories.
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "pipeline/report/overlay_painter.h"
+#include "pipeline/report/source_files.h"
+
+namespace q3d::pipeline::report {
+
+// One gallery before it is drawn.
+struct GalleryPlan {
+  std::string title;
+  std::string meaning;
+  std::vector<dataset::VerdictRow> rows;
+};
+
+// The best and the worst labels, the candidates nearest to tau_low, tau_high and delta, and random ones, at
+// most `size` each. The random ones are drawn by the candidates' ids, so the same dataset gives the same.
+std::vector<GalleryPlan> plan_galleries(const dataset::PublishedDataset& dataset,
+                                        const std::vector<dataset::VerdictRow>& rows, std::size_t size);
+
+// [{title, meaning, open, panels: [names], cards: [{id, line, why, story, picture, width, height}]}]. A
+// picture is a data URI of a JPEG; `story` is what `explain` tells. Galleries without rows are left out.
+nlohmann::ordered_json draw_galleries(const dataset::PublishedDataset& dataset, const SourceFiles& files,
+                                      const OverlayPainter& painter, const std::vector<GalleryPlan>& plans);
+
+}  // namespace q3d::pipeline::report

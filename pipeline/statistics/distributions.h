@@ -1,0 +1,28 @@
+// How the candidates' numbers are spread: errors, adaptation, visible keypoints, sizes.
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include "pipeline/dataset/dataset_manifest.h"
+#include "pipeline/statistics/facts.h"
+
+namespace q3d::pipeline::statistics {
+
+// L_proj of the predictions in bins, by verdict: {low, high, beyond, counts: {retained: [...], refined,
+// discarded, failed}, final_counts: of the labels}. The bins end where 98 % of the errors, and every
+// threshold, are within. Null where no prediction was judged.
+nlohmann::ordered_json error_histogram(const Facts& facts, const dataset::DatasetManifest& manifest);
+
+// Of the adapted candidates, at most `most`, evenly spread: {adapted, shown, iterations, best_iteration,
+// gain, before, after, kept: [...]}. Null where none was adapted.
+nlohmann::ordered_json adaptation(const Facts& facts, std::size_t most = 2500);
+
+// How many candidates, and how many kept ones, have 0 to 26 visible keypoints.
+nlohmann::ordered_json visible_keypoints(const Facts& facts);
+
+// Widths and heights of pictures, and the longer sides of boxes, in px: quantiles {min, q05, q25, median,
+// q75, q95, max} and a histogram of the boxes' longer sides with 30 bins. Boxes below the crop of the network
+// (256 px) are enlarged for it; `boxes_below_crop` counts them.
+nlohmann::ordered_json sizes(const Facts& facts);
+
+}  // namespace q3d::pipeline::statistics
