@@ -61,7 +61,8 @@ ClipVisual::ClipVisual(const PrimaConfig& config, const Placement& placement) {
       register_parameter("positional_embedding", torch::empty({kClipTokens + 1, width}, placement.vector()));
   proj_ = register_parameter("proj", torch::empty({width, config.clip_out}, placement.vector()));
   const Tokeniser::Patches patches{"conv1", kPatchPx, /*padding_px=*/0, /*has_bias=*/false};
-  tokeniser_ = std::make_unique<Tokeniser>(*this, patches, width, config.clip_stem_depth, placement);
+  const Tokeniser::Stem stem{config.clip_stem_depth, config.clip_efficientnet_stem};
+  tokeniser_ = std::make_unique<Tokeniser>(*this, patches, width, stem, placement);
   ln_pre_ = register_module("ln_pre", std::make_shared<LayerNorm>(width, kNormEpsilon, placement));
   const auto transformer = register_module("transformer", std::make_shared<torch::nn::Module>());
   const auto blocks = transformer->register_module("resblocks", std::make_shared<torch::nn::Module>());

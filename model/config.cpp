@@ -30,12 +30,14 @@ constexpr std::array kFields{
     Field{"heads", &PrimaConfig::heads},
     Field{"mlp_ratio", &PrimaConfig::mlp_ratio},
     Field{"stem_depth", &PrimaConfig::stem_depth, 0},
+    Field{"efficientnet_stem", &PrimaConfig::efficientnet_stem},
     Field{"clip_width", &PrimaConfig::clip_width},
     Field{"clip_layers", &PrimaConfig::clip_layers},
     Field{"clip_heads", &PrimaConfig::clip_heads},
     Field{"clip_out", &PrimaConfig::clip_out},
     Field{"clip_quick_gelu", &PrimaConfig::clip_quick_gelu},
     Field{"clip_stem_depth", &PrimaConfig::clip_stem_depth, 0},
+    Field{"clip_efficientnet_stem", &PrimaConfig::clip_efficientnet_stem},
     Field{"dec_dim", &PrimaConfig::dec_dim},
     Field{"dec_layers", &PrimaConfig::dec_layers},
     Field{"dec_heads", &PrimaConfig::dec_heads},
@@ -107,6 +109,11 @@ PrimaConfig named_config(const std::string& name) {
     config.true_token_grid = true;
     return config;
   }
+  if (name == "lite") {  // starts from an EfficientNet-Lite0 that knows photographs
+    config = named_config("small");
+    config.stem_depth = 0, config.efficientnet_stem = true;
+    return config;
+  }
   if (name == "tiny") {
     config.embed_dim = 64, config.depth = 2, config.heads = 4;
     config.clip_width = 64, config.clip_layers = 2, config.clip_heads = 4, config.clip_out = 32;
@@ -114,7 +121,7 @@ PrimaConfig named_config(const std::string& name) {
     return config;
   }
   throw std::invalid_argument(
-      fmt::format("model size '{}' is unknown; known sizes: vith, small, tiny", name));
+      fmt::format("model size '{}' is unknown; known sizes: vith, small, lite, tiny", name));
 }
 
 void check_config(const PrimaConfig& config) {
@@ -129,6 +136,13 @@ void check_config(const PrimaConfig& config) {
   require_divides("heads", config.heads, "embed_dim", config.embed_dim);
   require_divides("clip_heads", config.clip_heads, "clip_width", config.clip_width);
   require_divides("dec_heads", config.dec_heads, "dec_dim", config.dec_dim);
+  for (const auto& [key, depth, other, efficientnet] :
+       {std::tuple{"stem_depth", config.stem_depth, "efficientnet_stem", config.efficientnet_stem},
+        std::tuple{"clip_stem_depth", config.clip_stem_depth, "clip_efficientnet_stem",
+                   config.clip_efficientnet_stem}}) {
+    require(depth == 0 || !efficientnet,
+            fmt::format("'{}' = {} and '{}' exclude each other", key, depth, other));
+  }
   // A stem's first maps have a quarter of the width; its group norms take 16 channels together.
   for (const auto& [key, depth, width] :
        {std::tuple{"embed_dim", config.stem_depth, config.embed_dim},

@@ -14,15 +14,17 @@ struct PrimaConfig {
   std::int64_t depth = 32;
   std::int64_t heads = 16;
   std::int64_t mlp_ratio = 4;
-  std::int64_t stem_depth =
-      0;  // 0: the official patch projection; else a convolutional stem (model/conv_stem.h)
+  // Neither: the official patch projection. At most one of the two:
+  std::int64_t stem_depth = 0;     // of a convolutional stem (model/conv_stem.h)
+  bool efficientnet_stem = false;  // the first part of EfficientNet-Lite0 (model/efficientnet_lite.h)
   // BioCLIP visual encoder
   std::int64_t clip_width = 768;
   std::int64_t clip_layers = 12;
   std::int64_t clip_heads = 12;
   std::int64_t clip_out = 512;
   bool clip_quick_gelu = false;
-  std::int64_t clip_stem_depth = 0;  // as stem_depth
+  std::int64_t clip_stem_depth = 0;     // as stem_depth
+  bool clip_efficientnet_stem = false;  // as efficientnet_stem
   // keypoint-aware decoder
   std::int64_t dec_dim = 1280;
   std::int64_t dec_layers = 6;
@@ -45,7 +47,8 @@ struct PrimaConfig {
   bool operator==(const PrimaConfig&) const = default;
 };
 
-// Named sizes: "vith" (the paper's), "small" and "tiny". Throws std::invalid_argument naming the known ones.
+// Named sizes: "vith" (the paper's), "small", "lite" (small with an EfficientNet stem) and "tiny". Throws
+// std::invalid_argument naming the known ones.
 PrimaConfig named_config(const std::string& name);
 
 // Throws std::invalid_argument when two sizes do not fit together (heads that do not divide the width, ...).

@@ -60,10 +60,16 @@ torch::Tensor ConvStem::forward(const torch::Tensor& images) const {
   return proj_->forward(maps.flatten(2).transpose(1, 2));
 }
 
-Tokeniser::Tokeniser(torch::nn::Module& owner, const Patches& patches, std::int64_t width, std::int64_t depth,
+Tokeniser::Tokeniser(torch::nn::Module& owner, const Patches& patches, std::int64_t width, const Stem& stem,
                      const Placement& placement) {
-  if (depth > 0) {
-    stem_ = owner.register_module("stem", std::make_shared<ConvStem>(width, depth, placement));
+  if (stem.depth > 0) {
+    stem_ = owner.register_module("stem", std::make_shared<ConvStem>(width, stem.depth, placement));
+    return;
+  }
+  if (stem.efficientnet) {
+    efficientnet_ = owner.register_module(kEfficientNetName, std::make_shared<EfficientNetLite>(placement));
+    proj_ = owner.register_module(patches.projection,
+                                  std::make_shared<Linear>(EfficientNetLite::kChannels, width, placement));
     return;
   }
   patches_ = owner.register_module(
@@ -72,7 +78,10 @@ Tokeniser::Tokeniser(torch::nn::Module& owner, const Patches& patches, std::int6
 }
 
 torch::Tensor Tokeniser::forward(const torch::Tensor& images) const {
-  return stem_ ? stem_->forward(images) : patches_->forward(images);
+  if (stem_) return stem_->forward(images);
+  if (patches_) return patches_->forward(images);
+  // The maps lie in channels-last order, so that their tokens are a view of them.
+  return proj_->forward(efficientnet_->forward(images).permute({0, 2, 3, 1}).flatten(1, 2));
 }
 
 }  // namespace q3d::model

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "model/efficientnet_lite.h"
 #include "model/layers.h"
 
 namespace q3d::model {
@@ -30,8 +31,10 @@ class ConvStem : public torch::nn::Module {
   std::shared_ptr<Linear> proj_;
 };
 
-// Cuts images into tokens: the official patch projection when depth is 0, else a convolutional stem.
-// Registers its parameters with `owner`, the projection under the name `projection`, the stem under "stem".
+// Cuts images into tokens: by the official patch projection, by a convolutional stem, or by an EfficientNet
+// whose channels a matrix maps to the width. Registers its parameters with `owner`: the projection, and the
+// matrix in its place, under the name `projection`, the stem under "stem", the EfficientNet under
+// "efficientnet".
 class Tokeniser {
  public:
   struct Patches {
@@ -40,7 +43,11 @@ class Tokeniser {
     std::int64_t padding_px;
     bool has_bias;
   };
-  Tokeniser(torch::nn::Module& owner, const Patches& patches, std::int64_t width, std::int64_t depth,
+  struct Stem {  // at most one of the two (check_config); neither: the patch projection
+    std::int64_t depth = 0;
+    bool efficientnet = false;
+  };
+  Tokeniser(torch::nn::Module& owner, const Patches& patches, std::int64_t width, const Stem& stem,
             const Placement& placement);
 
   torch::Tensor forward(const torch::Tensor& images) const;  // (B, 3, H, W) -> (B, tokens, width)
@@ -48,6 +55,8 @@ class Tokeniser {
  private:
   std::shared_ptr<PatchConv> patches_;
   std::shared_ptr<ConvStem> stem_;
+  std::shared_ptr<EfficientNetLite> efficientnet_;
+  std::shared_ptr<Linear> proj_;  // of the EfficientNet's channels
 };
 
 }  // namespace q3d::model

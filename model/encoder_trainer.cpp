@@ -25,10 +25,6 @@ constexpr double kPatchPx = 16.0;
 constexpr double kFirstCentrePx = kPatchPx / 2 - 2.0;
 constexpr double kLeftPx = 32.0;
 
-bool is_encoder(const std::string& name) {
-  return name.starts_with("backbone.") || name.starts_with("bioclip_embedding.species_model.");
-}
-
 // Bilinear share of each of `count` positions in coordinate `at` (...) -> (..., count).
 torch::Tensor hat(const torch::Tensor& at, std::int64_t count) {
   const torch::Tensor centres = torch::arange(count, at.options());
@@ -97,15 +93,11 @@ EncoderTrainer::EncoderTrainer(std::shared_ptr<PrimaNet> net, const EncoderTrain
   }
   heads_ = std::make_shared<Heads>(net_->config(), options_.species, net_->placement(), options_.seed);
   net_->train();
-  ParameterGroup group;
-  for (auto& parameter : net_->named_parameters()) {
-    parameter.value().set_requires_grad(is_encoder(parameter.key()));
-    if (is_encoder(parameter.key())) group.parameters.emplace_back(parameter.key(), parameter.value());
-  }
+  std::vector<ParameterGroup> groups = encoder_groups(*net_, options_.stem);
   for (auto& parameter : heads_->named_parameters()) {
-    group.parameters.emplace_back(kHeads + parameter.key(), parameter.value());
+    groups.front().parameters.emplace_back(kHeads + parameter.key(), parameter.value());
   }
-  optimiser_ = AdamW({group}, options_.adamw);
+  optimiser_ = AdamW(std::move(groups), options_.adamw);
   backward_ = ranks_->averaged_backward(optimiser_.parameters());
 }
 

@@ -19,6 +19,7 @@ namespace q3d::model {
 struct EncoderTrainerOptions {
   AdamWOptions adamw;
   RateSchedule schedule;
+  StemTraining stem;
   double largest_gradient_norm = 0.0;  // longer gradients are scaled down to it; 0 = never
   Precision precision = Precision::float32;
   std::int64_t species = 0;  // number of names

@@ -2,8 +2,13 @@
 #include "model/init.h"
 
 #include <cmath>
+#include <map>
+#include <optional>
+#include <stdexcept>
 #include <string_view>
 
+#include "model/efficientnet_lite.h"
+#include "model/pretrained_stem.h"
 #include "model/prima.h"
 #include "model/seeded_uniform.h"
 
@@ -25,9 +30,10 @@ bool contains(std::string_view name, std::string_view part) {
   return name.find(part) != std::string_view::npos;
 }
 
-bool is_layer_norm(std::string_view name) {
-  return contains(name, "norm") || contains(name, ".ln_") || contains(name, "projection.1.") ||
-         contains(name, "param_to_token.1.");
+// Layer norms, group norms, and the norms of an EfficientNet.
+bool is_norm(std::string_view name) {
+  return contains(name, "norm") || contains(name_in_efficientnet(name), "_bn") || contains(name, ".ln_") ||
+         contains(name, "projection.1.") || contains(name, "param_to_token.1.");
 }
 
 bool is_embedding(std::string_view name) {
@@ -42,10 +48,11 @@ bool is_last_of_head(std::string_view name) {
 
 // Followed by a ReLU: He et al. 2015.
 bool is_stem_convolution(const TensorSpec& spec) {
-  return contains(spec.name, ".stem.") && spec.shape.size() == 4;
+  const bool in_stem = contains(spec.name, ".stem.") || !name_in_efficientnet(spec.name).empty();
+  return in_stem && spec.shape.size() == 4;
 }
 
-// The spread of a tensor that is neither constant nor a layer norm. Embeddings have the official standard
+// The spread of a tensor that is neither constant nor a norm. Embeddings have the official standard
 // deviation; matrices the fan-in rule of torch.nn.Linear, and biases none.
 double uniform_bound(const TensorSpec& spec) {
   if (is_embedding(spec.name)) return std::sqrt(3.0) * kEmbeddingStd;
@@ -101,7 +108,7 @@ torch::Tensor initial_tensor(const TensorSpec& spec, std::uint64_t seed) {
     const auto side = static_cast<std::int64_t>(std::lround(std::sqrt(spec.shape[0] - 1)));
     return grid_positions(side, side, spec.shape[1]);
   }
-  if (is_layer_norm(spec.name)) {
+  if (is_norm(spec.name)) {
     return ends_with(spec.name, ".weight") ? torch::ones(spec.shape) : torch::zeros(spec.shape);
   }
   torch::Tensor tensor = torch::empty(spec.shape);
@@ -117,12 +124,23 @@ void initialise(PrimaNet& net, std::uint64_t seed) {
 }
 
 void write_initial_checkpoint(const std::filesystem::path& path, const PrimaConfig& config,
-                              std::uint64_t seed, torch::ScalarType dtype) {
+                              std::uint64_t seed, torch::ScalarType dtype,
+                              const std::filesystem::path& stem) {
+  std::optional<PretrainedStem> pretrained;
+  if (!stem.empty()) {
+    if (!config.efficientnet_stem && !config.clip_efficientnet_stem) {
+      throw std::invalid_argument(stem.string() +
+                                  ": a pre-trained stem, but a network of this size has none (\"lite\" has)");
+    }
+    pretrained.emplace(stem);
+  }
   smal::tensors::NamedTensors tensors;
   for (const TensorSpec& spec : expected_tensors(config)) {
-    tensors.emplace_back(spec.name, initial_tensor(spec, seed).to(dtype));
+    const torch::Tensor known = pretrained ? pretrained->values(spec) : torch::Tensor();
+    tensors.emplace_back(spec.name, (known.defined() ? known : initial_tensor(spec, seed)).to(dtype));
   }
-  write_checkpoint(path, config, tensors);
+  write_checkpoint(path, config, tensors,
+                   pretrained ? pretrained->origin() : std::map<std::string, std::string>{});
 }
 
 }  // namespace q3d::model

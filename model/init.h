@@ -11,7 +11,7 @@
 namespace q3d::model {
 
 // The initial float32 values of one tensor: a function of its name, its shape and the seed alone, and the
-// same bytes on every machine. Layer norms start at one and zero, init_pose at the identity, init_cam at the
+// same bytes on every machine. Norms start at one and zero, init_pose at the identity, init_cam at the
 // official camera, biases at zero, matrices and embeddings uniform.
 torch::Tensor initial_tensor(const TensorSpec& spec, std::uint64_t seed);
 

@@ -1,12 +1,53 @@
 #include "model/optimiser.h"
 
 #include <algorithm>
+#include <functional>
 #include <string_view>
 
+#include "model/efficientnet_lite.h"
 #include "model/module_state.h"
 #include "model/net.h"
 
 namespace q3d::model {
+namespace {
+
+bool is_backbone(std::string_view name) {
+  return name.starts_with("backbone.");
+}
+
+bool is_bio_encoder(std::string_view name) {
+  return name.starts_with("bioclip_embedding.species_model.");
+}
+
+bool is_in_efficientnet(std::string_view name) {
+  return !name_in_efficientnet(name).empty();
+}
+
+// What a group holds, and how fast it learns.
+struct Share {
+  std::function<bool(std::string_view name)> holds;
+  double rate_scale;
+};
+
+// The parameters by the first share that holds them. Gradients are switched on for these and off for all
+// others. Groups without a parameter are left out, but for the first `always`.
+std::vector<ParameterGroup> split(PrimaNet& net, const std::vector<Share>& shares, std::size_t always) {
+  std::vector<ParameterGroup> groups;
+  for (const Share& share : shares) groups.push_back({{}, share.rate_scale});
+  for (auto& parameter : net.named_parameters()) {
+    const auto share = std::find_if(shares.begin(), shares.end(),
+                                    [&](const Share& candidate) { return candidate.holds(parameter.key()); });
+    parameter.value().set_requires_grad(share != shares.end());
+    if (share == shares.end()) continue;
+    groups[static_cast<std::size_t>(share - shares.begin())].parameters.emplace_back(parameter.key(),
+                                                                                     parameter.value());
+  }
+  while (groups.size() > always && groups.back().parameters.empty()) groups.pop_back();
+  return groups;
+}
+
+}  // namespace
+
 AdamW::AdamW(std::vector<ParameterGroup> groups, const AdamWOptions& options) : options_(options) {
   for (ParameterGroup& group : groups) {
     Group& kept = groups_.emplace_back();
@@ -98,19 +139,33 @@ void AdamW::restore_state(const smal::tensors::SafeTensors& file, const std::str
   }
 }
 
-std::vector<ParameterGroup> parameter_groups(PrimaNet& net, double backbone_rate_scale) {
-  ParameterGroup backbone{{}, backbone_rate_scale};
-  ParameterGroup others{{}, 1.0};
-  for (auto& parameter : net.named_parameters()) {
-    const std::string_view name = parameter.key();
-    const bool trains =
-        !name.starts_with("bioclip_embedding.species_model.") || net.config().learn_bio_encoder;
-    parameter.value().set_requires_grad(trains);
-    if (!trains) continue;
-    ParameterGroup& group = name.starts_with("backbone.") ? backbone : others;
-    group.parameters.emplace_back(parameter.key(), parameter.value());
-  }
-  return {std::move(backbone), std::move(others)};
+std::vector<ParameterGroup> parameter_groups(PrimaNet& net, double backbone_rate_scale,
+                                             const StemTraining& stem) {
+  const bool bio_learns = net.config().learn_bio_encoder;
+  const auto trains = [bio_learns, frozen = stem.frozen_blocks](std::string_view name) {
+    return (bio_learns || !is_bio_encoder(name)) && !is_in_first_blocks(name, frozen);
+  };
+  const auto in_stem = [trains](std::string_view name) { return trains(name) && is_in_efficientnet(name); };
+  return split(
+      net,
+      {{[=](std::string_view name) { return trains(name) && is_backbone(name) && !in_stem(name); },
+        backbone_rate_scale},
+       {[=](std::string_view name) { return trains(name) && !is_backbone(name) && !in_stem(name); }, 1.0},
+       {[=](std::string_view name) { return is_backbone(name) && in_stem(name); },
+        backbone_rate_scale * stem.rate_scale},
+       {[=](std::string_view name) { return !is_backbone(name) && in_stem(name); }, stem.rate_scale}},
+      /*always=*/2);
+}
+
+std::vector<ParameterGroup> encoder_groups(PrimaNet& net, const StemTraining& stem) {
+  const auto trains = [frozen = stem.frozen_blocks](std::string_view name) {
+    return (is_backbone(name) || is_bio_encoder(name)) && !is_in_first_blocks(name, frozen);
+  };
+  return split(
+      net,
+      {{[=](std::string_view name) { return trains(name) && !is_in_efficientnet(name); }, 1.0},
+       {[=](std::string_view name) { return trains(name) && is_in_efficientnet(name); }, stem.rate_scale}},
+      /*always=*/1);
 }
 
 double rate_at(const RateSchedule& schedule, std::int64_t step) {

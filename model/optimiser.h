@@ -65,11 +65,27 @@ class AdamW {
   AdamWOptions options_;
 };
 
+// How the EfficientNets of a network learn: what knows pictures already needs small steps.
+struct StemTraining {
+  double rate_scale = 1.0;  // beside the rate that their encoder has
+  std::int64_t frozen_blocks =
+      0;  // the first convolution and so many blocks keep their values; 0 = all learn
+
+  bool operator==(const StemTraining&) const = default;
+};
+
 // Official code: PRIMA.get_parameters and configure_optimizers. The backbone learns at a tenth of the rate;
 // the decoder and BioCLIP's projection at the full rate. BioCLIP's encoder is in no group, and its gradients
-// are switched off, unless the network trains it instead of keeping it frozen.
+// are switched off, unless the network trains it instead of keeping it frozen. Groups: the backbone, the
+// rest, and after them, where the network has such, the EfficientNets of the backbone and of a BioCLIP that
+// learns.
 inline constexpr double kBackboneRateScale = 0.1;
-std::vector<ParameterGroup> parameter_groups(PrimaNet& net, double backbone_rate_scale = kBackboneRateScale);
+std::vector<ParameterGroup> parameter_groups(PrimaNet& net, double backbone_rate_scale = kBackboneRateScale,
+                                             const StemTraining& stem = {});
+
+// The two image encoders, for their pre-training: all but the EfficientNets, then these where the network has
+// such. Gradients of the rest of the network are switched off.
+std::vector<ParameterGroup> encoder_groups(PrimaNet& net, const StemTraining& stem = {});
 
 // The learning rate over a run. Paper: linear decay; official code: none.
 struct RateSchedule {

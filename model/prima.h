@@ -72,8 +72,12 @@ class Prima {
 // A seeded checkpoint of the given sizes: every tensor of the network under its official name (CLIP's text
 // tower, the discriminator, the priors and the body are not part of it). The same seed gives the same bytes
 // on every machine. Sets the identity 6D pose (all-zero would give NaN) and the official initial camera.
-// dtype: float32, float16 or bfloat16. Throws std::runtime_error when the file cannot be written.
+// dtype: float32, float16 or bfloat16. stem: the file of a pre-trained stem (model/pretrained_stem.h), whose
+// values every EfficientNet of the network then has and whose origin the metadata tells; or empty. Throws
+// std::runtime_error when a file cannot be read or written, std::invalid_argument when there is a stem's file
+// but no EfficientNet in the network.
 void write_initial_checkpoint(const std::filesystem::path& path, const PrimaConfig& config,
-                              std::uint64_t seed, torch::ScalarType dtype = torch::kFloat32);
+                              std::uint64_t seed, torch::ScalarType dtype = torch::kFloat32,
+                              const std::filesystem::path& stem = {});
 
 }  // namespace q3d::model

@@ -72,7 +72,7 @@ Trainer::Trainer(std::shared_ptr<PrimaNet> net, smal::tensors::SmalBody body, Pr
       priors_(std::move(priors)),
       options_(options),
       ranks_(std::move(ranks)),
-      optimiser_(parameter_groups(*net_, options.backbone_rate_scale), options.adamw),
+      optimiser_(parameter_groups(*net_, options.backbone_rate_scale, options.stem), options.adamw),
       backward_(ranks_->averaged_backward(optimiser_.parameters())) {
   const torch::Device device = net_->placement().device;
   require(net_->placement().matrix_dtype == torch::kFloat32, "the network must hold float32 weights");

@@ -23,6 +23,7 @@ struct TrainerOptions {
   settings::LossVariant variant = settings::LossVariant::sound;
   AdamWOptions adamw;
   double backbone_rate_scale = kBackboneRateScale;  // of the schedule's rate
+  StemTraining stem;
   RateSchedule schedule;
   double largest_gradient_norm = 0.0;  // longer gradients are scaled down to it; 0 = never
   Precision precision = Precision::float32;

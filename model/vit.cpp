@@ -80,7 +80,8 @@ Vit::Vit(const PrimaConfig& config, const Placement& placement) {
   cls_token_ = register_parameter("cls_token", torch::empty({1, 1, width}, placement.vector()));
   const auto patch_embed = register_module("patch_embed", std::make_shared<torch::nn::Module>());
   const Tokeniser::Patches patches{"proj", kPatchPx, kPatchPaddingPx, /*has_bias=*/true};
-  tokeniser_ = std::make_unique<Tokeniser>(*patch_embed, patches, width, config.stem_depth, placement);
+  const Tokeniser::Stem stem{config.stem_depth, config.efficientnet_stem};
+  tokeniser_ = std::make_unique<Tokeniser>(*patch_embed, patches, width, stem, placement);
   const auto blocks = register_module("blocks", std::make_shared<torch::nn::Module>());
   for (std::int64_t i = 0; i < config.depth; ++i) {
     const double rate =

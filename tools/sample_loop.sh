@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The paper's three stages on the rendered world, from nothing:
-#   tools/sample_loop.sh model             pools, pre-trained encoders, Stage 1 (full schedule): models/small.safetensors
+# The paper's three stages on the rendered world, from a stem that knows photographs (models/README.md):
+#   tools/sample_loop.sh model             pools, pre-trained encoders, Stage 1 (long schedule): models/small.safetensors
 #   tools/sample_loop.sh loop SCHEDULE SEED   Stage 1, Stage 2, Stage 3, and both networks on the test sets
 # SCHEDULE is full or quick. Every step does what is missing, so a run that was stopped goes on where it was.
 set -euo pipefail
@@ -30,17 +30,27 @@ prepare() {
     "$program" build --config "configs/world_pools/$pool.json" --out "$home/pools/$pool"
   done
   [ -f "$home/initial.safetensors" ] && [ -f "$home/priors.safetensors" ] ||
-    "$program" init --size small --out "$home/initial.safetensors" --priors "$home/priors.safetensors" \
-      --smal-asset data/world/assets/smal_synthetic.safetensors
+    "$program" init --size lite --stem models/efficientnet_lite0.safetensors --out "$home/initial.safetensors" \
+      --priors "$home/priors.safetensors" --smal-asset data/world/assets/smal_synthetic.safetensors
+}
+
+# The encoders of the full and the quick schedule are the same; those of the long one are trained longer.
+encoders_of() {
+  if [ "$1" = long ]; then echo pretrain-long; else echo pretrain; fi
+}
+
+pretrain() {
+  local schedule=$1 layers=(--config configs/world_training.json)
+  [ "$schedule" != long ] || layers+=(--config configs/world_training_long.json)
   say "pre-training of the image encoders, shared by all stages"
-  train --config configs/world_training.json --stage pretrain --out "$home/pretrain"
+  train "${layers[@]}" --stage pretrain --out "$home/$(encoders_of "$schedule")"
 }
 
 # The training config's layers for a schedule and a seed; Stage 3 reads what this loop's Stage 2 made.
 layers() {
   local schedule=$1 seed=$2 run=$3
   cat >"$run/run.json" <<JSON
-{ "network": { "encoders": "../pretrain/model.safetensors" },
+{ "network": { "encoders": "../$(encoders_of "$schedule")/model.safetensors" },
   "pools": { "quadruped3d": { "shards": ["stage2/latest"], "weight": 0.5 } },
   "model_dtype": "float16",
   "seed": $seed }
@@ -90,11 +100,13 @@ loop() {
 case "${1:-}" in
   model)
     prepare
-    stage1 full 0 "$home/full-0"
-    say "trained: $home/full-0/stage1/model.safetensors (models/small.safetensors ships such a network)"
+    pretrain long
+    stage1 long 0 "$home/long-0"
+    say "trained: $home/long-0/stage1/model.safetensors (models/small.safetensors ships such a network)"
     ;;
   loop)
     prepare
+    pretrain "${2:-full}"
     loop "${2:-full}" "${3:-0}"
     ;;
   *)

@@ -188,15 +188,13 @@ std::string device_key(const config::NetworkConfig& network) {
   return on_cpu ? fmt::format("cpu-{}", compute_threads(network)) : "cuda";
 }
 
-void write_initial_checkpoint(const std::filesystem::path& path, const std::string& size,
-                              std::uint64_t seed) {
-  model::PrimaConfig config;
+void write_initial_checkpoint(const std::filesystem::path& path, const std::string& size, std::uint64_t seed,
+                              const std::filesystem::path& stem) {
   try {
-    config = model::named_config(size);
+    model::write_initial_checkpoint(path, model::named_config(size), seed, torch::kFloat32, stem);
   } catch (const std::invalid_argument& error) {
     throw run::ConfigError(error.what());
   }
-  model::write_initial_checkpoint(path, config, seed);
 }
 
 }  // namespace q3d::pipeline::network

@@ -28,7 +28,10 @@ int compute_threads(const config::NetworkConfig& network);
 // Throws as load_network does.
 std::string device_key(const config::NetworkConfig& network);
 
-// A seeded checkpoint of a named size ("vith", "small", "tiny"). Throws ConfigError for another name.
-void write_initial_checkpoint(const std::filesystem::path& path, const std::string& size, std::uint64_t seed);
+// A seeded checkpoint of a named size ("vith", "small", "lite", "tiny"), with the weights of the pre-trained
+// stem in the file `stem` unless that is empty. Throws ConfigError for another name, or a stem for a size
+// that has none, std::runtime_error when a file cannot be read or written.
+void write_initial_checkpoint(const std::filesystem::path& path, const std::string& size, std::uint64_t seed,
+                              const std::filesystem::path& stem = {});
 
 }  // namespace q3d::pipeline::network

@@ -195,6 +195,7 @@ model::TrainerOptions trainer_options(const TrainingConfig& config, const PhaseC
   options.variant = config.loss_variant;
   options.adamw.weight_decay = config.weight_decay;
   options.backbone_rate_scale = config.backbone_rate;
+  options.stem = {config.stem_rate, config.frozen_stem_blocks};
   options.schedule = {phase.learning_rate, phase.warm_up_steps,
                       phase.decay == Decay::linear ? phase.steps : 0};
   options.largest_gradient_norm = config.largest_gradient_norm;
@@ -211,6 +212,7 @@ model::EncoderTrainerOptions encoder_options(const TrainingConfig& config, const
   model::EncoderTrainerOptions options;
   options.adamw = common.adamw;
   options.schedule = common.schedule;
+  options.stem = common.stem;
   options.largest_gradient_norm = common.largest_gradient_norm;
   options.precision = common.precision;
   options.species = static_cast<std::int64_t>(species);

@@ -27,7 +27,7 @@ TEST(Config, DefaultsAreThePaperSizes) {
 }
 
 TEST(Config, JsonRoundTripKeepsEveryField) {
-  for (const std::string name : {"vith", "small", "tiny"}) {
+  for (const std::string name : {"vith", "small", "lite", "tiny"}) {
     PrimaConfig config = named_config(name);
     config.clip_quick_gelu = true;
     config.focal_px = 812.5;
@@ -37,12 +37,13 @@ TEST(Config, JsonRoundTripKeepsEveryField) {
 }
 
 TEST(Config, NamedSizesFitTogether) {
-  for (const std::string name : {"vith", "small", "tiny"}) EXPECT_NO_THROW(check_config(named_config(name)));
+  for (const std::string name : {"vith", "small", "lite", "tiny"})
+    EXPECT_NO_THROW(check_config(named_config(name)));
   try {
     named_config("huge");
     FAIL();
   } catch (const std::invalid_argument& error) {
-    EXPECT_NE(std::string(error.what()).find("vith, small, tiny"), std::string::npos);
+    EXPECT_NE(std::string(error.what()).find("vith, small, lite, tiny"), std::string::npos);
   }
 }
 
@@ -71,6 +72,12 @@ TEST(Config, ImpossibleSizesAreRefused) {
   EXPECT_NE(message_of({{"depth", -3}}).find("'depth' = -3"), std::string::npos);
   EXPECT_NE(message_of({{"stem_depth", -1}}).find("[0, "), std::string::npos);
   EXPECT_NE(message_of({{"clip_stem_depth", 2}, {"clip_width", 96}}).find("'clip_width' = 96"),
+            std::string::npos);
+  EXPECT_NE(message_of({{"stem_depth", 2}, {"efficientnet_stem", true}})
+                .find("'stem_depth' = 2 and 'efficientnet_stem' exclude each other"),
+            std::string::npos);
+  EXPECT_NE(message_of({{"clip_stem_depth", 2}, {"clip_efficientnet_stem", true}})
+                .find("'clip_stem_depth' = 2 and"),
             std::string::npos);
   EXPECT_NE(message_of({{"embed_dim", 1LL << 40}}).find("'embed_dim'"), std::string::npos);
   EXPECT_NE(message_of({{"focal_px", 0}}).find("'focal_px'"), std::string::npos);

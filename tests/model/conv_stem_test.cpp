@@ -38,13 +38,41 @@ TEST(ConvStem, FollowsTheHandComputedMaps) {
 TEST(Tokeniser, RegistersTheOfficialNameOrAStem) {
   const Tokeniser::Patches patches{"proj", 16, 2, true};
   torch::nn::Module official("official");
-  const Tokeniser plain(official, patches, 64, 0, {});
+  const Tokeniser plain(official, patches, 64, {}, {});
   EXPECT_EQ(official.named_parameters().keys(), (std::vector<std::string>{"proj.weight", "proj.bias"}));
   torch::nn::Module ours("ours");
-  const Tokeniser stemmed(ours, patches, 64, 2, {});
+  const Tokeniser stemmed(ours, patches, 64, {.depth = 2}, {});
   for (const std::string& name : ours.named_parameters().keys())
     EXPECT_TRUE(name.starts_with("stem.")) << name;
   EXPECT_EQ(stemmed.forward(torch::zeros({1, 3, 256, 192})).sizes(), (at::IntArrayRef{1, 192, 64}));
+}
+
+// The matrix in the projection's place maps the channels of each place on the map to its token, in row-major
+// order.
+TEST(Tokeniser, MapsAnEfficientNetsChannels) {
+  const torch::NoGradGuard no_grad;
+  torch::nn::Module owner("owner");
+  const Tokeniser tokeniser(owner, {"conv1", 16, 0, false}, 64, {.efficientnet = true}, {});
+  torch::manual_seed(2);
+  for (auto& parameter : owner.named_parameters()) {
+    EXPECT_TRUE(parameter.key().starts_with("efficientnet.") || parameter.key() == "conv1.weight" ||
+                parameter.key() == "conv1.bias")
+        << parameter.key();
+    torch::Tensor& value = parameter.value();
+    value.copy_(0.2 * torch::randn(value.sizes()));
+    if (parameter.key().find("_bn") != std::string::npos && value.dim() == 1) value.fill_(1.0);
+  }
+  const auto parameters = owner.named_parameters();
+  const auto network = std::dynamic_pointer_cast<EfficientNetLite>(owner.children().front());
+  ASSERT_NE(network, nullptr);
+  const torch::Tensor images = torch::randn({2, 3, 64, 32});
+  const torch::Tensor maps = network->forward(images), tokens = tokeniser.forward(images);
+  ASSERT_EQ(tokens.sizes(), (at::IntArrayRef{2, 8, 64}));
+  for (const auto& [row, column] : {std::pair{0, 1}, std::pair{3, 0}}) {
+    const torch::Tensor expected =
+        parameters["conv1.weight"].mv(maps[1].select(2, column).select(1, row)) + parameters["conv1.bias"];
+    EXPECT_TRUE(torch::allclose(tokens[1][2 * row + column], expected, 1e-4, 1e-5)) << row;
+  }
 }
 
 }  // namespace

@@ -141,5 +141,73 @@ TEST(ParameterGroups, FollowTheOfficialCode) {
   }
 }
 
+bool in_efficientnet(const std::string& name) {
+  return name.find(".efficientnet.") != std::string::npos;
+}
+
+PrimaConfig stemmed() {
+  PrimaConfig config = named_config("tiny");
+  config.efficientnet_stem = config.clip_efficientnet_stem = true;
+  return config;
+}
+
+TEST(ParameterGroups, AnEfficientNetLearnsAtItsOwnRateBehindTheFrozenBlocks) {
+  PrimaNet net(stemmed());
+  const auto groups = parameter_groups(net, 0.5, {.rate_scale = 0.2, .frozen_blocks = 3});
+  ASSERT_EQ(groups.size(), 3U);  // the bio encoder does not learn, its EfficientNet neither
+  EXPECT_DOUBLE_EQ(groups[0].rate_scale, 0.5);
+  EXPECT_DOUBLE_EQ(groups[1].rate_scale, 1.0);
+  EXPECT_DOUBLE_EQ(groups[2].rate_scale, 0.1);
+  std::size_t in_groups = 0;
+  for (const std::size_t group : {0U, 1U, 2U}) {
+    for (const auto& [name, tensor] : groups[group].parameters) {
+      EXPECT_EQ(in_efficientnet(name), group == 2) << name;
+      EXPECT_TRUE(tensor.requires_grad()) << name;
+      ++in_groups;
+    }
+  }
+  EXPECT_EQ(groups[2].parameters.front().first,
+            "backbone.patch_embed.efficientnet._blocks.3._expand_conv.weight");
+  std::size_t learning = 0;
+  for (const auto& parameter : net.named_parameters())
+    learning += parameter.value().requires_grad() ? 1U : 0U;
+  EXPECT_EQ(in_groups, learning);
+}
+
+TEST(ParameterGroups, ABioEncoderThatLearnsHasAStemOfItsOwnRate) {
+  PrimaConfig config = stemmed();
+  config.learn_bio_encoder = true;
+  PrimaNet net(config);
+  const auto groups = parameter_groups(net, 0.5, {.rate_scale = 0.2, .frozen_blocks = 3});
+  ASSERT_EQ(groups.size(), 4U);
+  EXPECT_DOUBLE_EQ(groups[3].rate_scale, 0.2);
+  for (const auto& [name, tensor] : groups[3].parameters) {
+    EXPECT_TRUE(name.starts_with("bioclip_embedding.species_model.visual.efficientnet._blocks.")) << name;
+  }
+}
+
+TEST(EncoderGroups, HoldTheEncodersAndTheirStems) {
+  PrimaNet net(stemmed());
+  const auto groups = encoder_groups(net, {.rate_scale = 0.2, .frozen_blocks = 0});
+  ASSERT_EQ(groups.size(), 2U);
+  EXPECT_DOUBLE_EQ(groups[0].rate_scale, 1.0);
+  EXPECT_DOUBLE_EQ(groups[1].rate_scale, 0.2);
+  for (const std::size_t group : {0U, 1U}) {
+    for (const auto& [name, tensor] : groups[group].parameters) {
+      EXPECT_EQ(in_efficientnet(name), group == 1) << name;
+      EXPECT_TRUE(name.starts_with("backbone.") || name.starts_with("bioclip_embedding.species_model."))
+          << name;
+    }
+  }
+  EXPECT_EQ(groups[1].parameters.size(), 2U * 99U);
+  for (const auto& parameter : net.named_parameters()) {
+    const bool encoder = parameter.key().starts_with("backbone.") ||
+                         parameter.key().starts_with("bioclip_embedding.species_model.");
+    EXPECT_EQ(parameter.value().requires_grad(), encoder) << parameter.key();
+  }
+  PrimaNet plain(named_config("tiny"));
+  EXPECT_EQ(encoder_groups(plain).size(), 1U);
+}
+
 }  // namespace
 }  // namespace q3d::model

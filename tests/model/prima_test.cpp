@@ -56,7 +56,7 @@ class PrimaTest : public ::testing::Test {
 };
 
 TEST_F(PrimaTest, SeededNetworksPredictFiniteBodies) {
-  for (const std::string name : {"tiny", "small"}) {
+  for (const std::string name : {"tiny", "small", "lite"}) {
     for (const auto dtype : {torch::kFloat32, torch::kBFloat16}) {
       SCOPED_TRACE(name);
       const Prima prima = seeded(named_config(name), dtype);

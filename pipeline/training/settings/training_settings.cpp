@@ -11,6 +11,7 @@ using loaders::pictures::AugmentOptions;
 using model::settings::LossVariant;
 using model::settings::LossWeights;
 
+constexpr int kMostStemBlocks = 11;  // of an EfficientNetLite (model/efficientnet_lite.h)
 constexpr Range kAtLeastOne{.least = 1};
 constexpr Range kNotNegative{.least = 0};
 constexpr Range kShare{.least = 0, .most = 1};
@@ -62,6 +63,20 @@ const Settings<TrainingConfig>& training_settings() {
            "learning rate of the backbone as a share of the head's (the paper: a tenth), in phases "
            "with the objective `prima`",
        .range = kNotNegative,
+       .decides = DecidedStage::weights},
+      {.key = "stem_rate",
+       .member = &TrainingConfig::stem_rate,
+       .description =
+           "learning rate of a pre-trained EfficientNet stem as a share of the rate of the encoder that it "
+           "belongs to, in all phases. What knows pictures already needs small steps",
+       .range = kNotNegative,
+       .decides = DecidedStage::weights},
+      {.key = "frozen_stem_blocks",
+       .member = &TrainingConfig::frozen_stem_blocks,
+       .description =
+           "the first convolution and so many of the 11 blocks of an EfficientNet stem keep their values. The "
+           "first blocks see the most pixels, so freezing them saves much of a step's time; 0 freezes nothing",
+       .range = {.least = 0, .most = kMostStemBlocks},
        .decides = DecidedStage::weights},
       {.key = "weight_decay",
        .member = &TrainingConfig::weight_decay,

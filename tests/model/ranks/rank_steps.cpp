@@ -5,8 +5,9 @@
 //   exact    the network's losses and AdamW in float64
 //   prima    Trainer in float32, with the discriminator
 //   encoders EncoderTrainer in float32
-//   naive_exact, naive_prima, naive_encoders
-//            the same, but each rank divides by its own counts and knows its own features alone
+//   prima_stem, encoders_stem
+//            the same with a pre-trained stem, of which two blocks are frozen
+//   naive_*  the same, but each rank divides by its own counts and knows its own features alone
 //   leave    rank 1 ends before the first step
 //   wait     meets nobody, for two seconds
 
@@ -146,13 +147,18 @@ smal::tensors::NamedTensors exact_steps(const RankPlace& place, const Collective
 }
 
 smal::tensors::NamedTensors learner_steps(const RankPlace& place,
-                                          const std::shared_ptr<const Collective>& ranks, bool encoders,
-                                          const std::filesystem::path& scratch) {
+                                          const std::shared_ptr<const Collective>& ranks,
+                                          const std::string& mode, const std::filesystem::path& scratch) {
+  const bool encoders = mode.starts_with("encoders");
+  const bool stemmed = mode.ends_with("_stem");
   PrimaConfig config = still(named_config("tiny"));
   config.embed_dim = 32, config.heads = 2;
   config.clip_width = 32, config.clip_layers = 1, config.clip_heads = 2, config.clip_out = 16;
   config.dec_dim = 32, config.dec_heads = 2, config.dec_ffn = 32;
-  write_initial_checkpoint(scratch, config, /*seed=*/3);
+  config.efficientnet_stem = stemmed;
+  const std::filesystem::path stem = testing::source_dir() / "models" / "efficientnet_lite0.safetensors";
+  write_initial_checkpoint(scratch, config, /*seed=*/3, torch::kFloat32, stemmed ? stem : "");
+  const StemTraining stem_training{.rate_scale = 0.5, .frozen_blocks = 2};
   const smal::tensors::SmalAsset asset = testing::load_parity_asset(testing::parity_dir());
   const smal::tensors::SmalBody body(asset);
   const auto net = load_net(smal::tensors::SafeTensors::open(scratch), config, asset, {});
@@ -165,11 +171,13 @@ smal::tensors::NamedTensors learner_steps(const RankPlace& place,
     EncoderTrainerOptions options;
     options.schedule = schedule;
     options.species = kSpecies;
+    options.stem = stem_training;
     learner = std::make_unique<EncoderTrainer>(net, options, ranks);
   } else {
     TrainerOptions options;
     options.schedule = schedule;
     options.adversarial = true;
+    options.stem = stem_training;
     learner = std::make_unique<Trainer>(
         net, body, load_priors(testing::parity_file("weights_A"), torch::kCPU), options, ranks);
   }
@@ -200,10 +208,9 @@ int run(std::string mode, const std::string& out) {
     ranks = std::make_shared<Naive>(ranks);
   }
   const std::string path = fmt::format("{}.{}", out, place.rank);
-  smal::tensors::write_safetensors(path,
-                                   mode == "exact" || mode == "leave"
-                                       ? exact_steps(place, *ranks)
-                                       : learner_steps(place, ranks, mode == "encoders", path + ".initial"));
+  smal::tensors::write_safetensors(path, mode == "exact" || mode == "leave"
+                                             ? exact_steps(place, *ranks)
+                                             : learner_steps(place, ranks, mode, path + ".initial"));
   return 0;
 }
 

@@ -182,7 +182,8 @@ TEST_P(Float32Ranks, TwoReportAndMoveAsOne) {
   EXPECT_GT(worst_error(one[0], naive[0], "gradient.", "", /*least=*/1e-4), 1e-2);
 }
 
-INSTANTIATE_TEST_SUITE_P(Learners, Float32Ranks, ::testing::Values("prima", "encoders"));
+INSTANTIATE_TEST_SUITE_P(Learners, Float32Ranks,
+                         ::testing::Values("prima", "encoders", "prima_stem", "encoders_stem"));
 
 TEST_F(Ranks, WhenOneLeavesTheOtherEndsAndSaysSo) {
   const auto start = std::chrono::steady_clock::now();

@@ -94,6 +94,34 @@ TEST_F(TrainingRun, EncodersAreTrainedAloneAndResume) {
   }
 }
 
+TEST_F(TrainingRun, AStemLearnsBehindItsFrozenBlocksAndResumes) {
+  model::PrimaConfig sizes = model::checkpoint_config(smal::tensors::SafeTensors::open(path("initial")));
+  sizes.efficientnet_stem = true;
+  model::write_initial_checkpoint(path("initial"), sizes, 3, torch::kFloat32,
+                                  testing::source_dir() / "models" / "efficientnet_lite0.safetensors");
+  config_.frozen_stem_blocks = 4;
+  config_.stem_rate = 0.5;
+  const PoolConfig first{"first", {path("first.h5").string()}, 1.0};
+  config_.phases = {{"encoders", Objective::encoders, {}, {first}, 2, 1, false, 1e-3, 0, Decay::none},
+                    {"joint", Objective::prima, {}, {first}, 2, 1, false, 1e-3, 0, Decay::none}};
+  const TrainingSummary straight = run("straight");
+  run("stopped", 1);
+  run("stopped", 2);
+  EXPECT_EQ(manifests::read_file(straight.model), manifests::read_file(run("stopped").model));
+  const smal::tensors::SafeTensors before = smal::tensors::SafeTensors::open(path("initial"));
+  const smal::tensors::SafeTensors after = smal::tensors::SafeTensors::open(straight.model);
+  const std::string prefix = "backbone.patch_embed.efficientnet.";
+  for (const std::string& name : before.names()) {
+    if (!name.starts_with(prefix)) continue;
+    bool frozen = false;
+    for (const char* part :
+         {"_conv_stem.", "_bn0.", "_blocks.0.", "_blocks.1.", "_blocks.2.", "_blocks.3."}) {
+      frozen = frozen || name.starts_with(prefix + part);
+    }
+    EXPECT_EQ(torch::equal(before.tensor(name), after.tensor(name)), frozen) << name;
+  }
+}
+
 TEST_F(TrainingRun, OneSpeciesCannotBeTold) {
   testing::write_sample_shard(path("single.h5"), "single", 1, 1);
   config_.phases = {{"encoders",

@@ -125,6 +125,8 @@ INSTANTIATE_TEST_SUITE_P(
         Mutation{"/augmentation/flip", "true", "unknown key"},
         Mutation{"/loss_weights/pse", "1", "did you mean \"pose\"?"},
         Mutation{"/loss_variant", "\"x\"", "sound, official"}, Mutation{"/weight_decay", "-1", "at least 0"},
+        Mutation{"/stem_rate", "-0.1", "at least 0"}, Mutation{"/frozen_stem_blocks", "12", "0 to 11"},
+        Mutation{"/frozen_stem_blocks", "-1", "0 to 11"},
         Mutation{"/largest_gradient_norm", "-1", "at least 0"},
         Mutation{"/divergence_factor", "1", "greater than 1"}, Mutation{"/seed", "-1", "seed"},
         Mutation{"/checkpoint_every", "0", "at least 1"}, Mutation{"/log_every", "0", "at least 1"}));
@@ -198,6 +200,8 @@ TEST(DecidingValues, HoldWhatDecidesTheWeights) {
                                                           {"/loss_weights/pose", 7},
                                                           {"/loss_variant", "sound"},
                                                           {"/backbone_rate", 0.2},
+      {"/stem_rate", 0.5},
+      {"/frozen_stem_blocks", 4},
                                                           {"/weight_decay", 0.2},
                                                           {"/largest_gradient_norm", 2},
                                                           {"/model_dtype", "float16"},
