@@ -27,15 +27,16 @@ struct Format {
 };
 // SLEAP's and Lightning Pose's files are tables of the same kind as DeepLabCut's, so all three share a
 // parser.
-constexpr std::array<Format, 9> kFormats{{{"prima", load_prima},
-                                          {"superanimal", load_superanimal},
-                                          {"animal_kingdom", load_animal_kingdom},
-                                          {"stanfordextra", load_stanford_extra},
-                                          {"badja", load_badja},
-                                          {"coco", load_coco_labels, true},
-                                          {"deeplabcut", load_deeplabcut, true},
-                                          {"sleap", load_deeplabcut, true},
-                                          {"lightning_pose", load_deeplabcut, true}}};
+constexpr std::array<Format, 10> kFormats{{{"prima", load_prima},
+                                           {"superanimal", load_superanimal},
+                                           {"animal_kingdom", load_animal_kingdom},
+                                           {"stanfordextra", load_stanford_extra},
+                                           {"badja", load_badja},
+                                           {"coco", load_coco_labels, true},
+                                           {"deeplabcut", load_deeplabcut, true},
+                                           {"sleap", load_deeplabcut, true},
+                                           {"lightning_pose", load_deeplabcut, true},
+                                           {"photographs", load_photographs}}};
 
 // Name and split are the first two parts of a sample id and must be separable from the rest.
 void require_id_part(const std::string& part, const char* option) {

@@ -21,6 +21,7 @@ Dataset load_stanford_extra(const DatasetOptions& options);
 Dataset load_badja(const DatasetOptions& options);
 Dataset load_coco_labels(const DatasetOptions& options);
 Dataset load_deeplabcut(const DatasetOptions& options);
+Dataset load_photographs(const DatasetOptions& options);
 
 // The state of a parser while it reads one file.
 struct Loading {

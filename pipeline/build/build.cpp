@@ -156,6 +156,7 @@ class UnitBuilder {
 }  // namespace
 
 BuildSummary build(const config::BuildConfig& config, const run::RunOptions& options) {
+  config::require_keypoints(config);
   const auto start = std::chrono::steady_clock::now();
   const config::JudgingRules rules = config::judging_rules(config);
   Workspace workspace(config, options);

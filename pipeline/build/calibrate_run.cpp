@@ -211,6 +211,7 @@ std::map<std::string, std::vector<Scored>> split_pool(std::vector<Scored> scored
 }  // namespace
 
 CalibrationSummary calibrate(const config::BuildConfig& config, const run::RunOptions& options) {
+  config::require_keypoints(config);
   if (!config::needs_network(config)) {
     throw run::ConfigError(
         "no dataset of the config has the role \"pseudo\", so no label is predicted and there is nothing to "

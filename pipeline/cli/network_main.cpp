@@ -8,9 +8,10 @@
 int main(int argc, char** argv) {
   namespace cli = q3d::pipeline::cli;
   if (!cli::waiting_is_decided()) return cli::start_again_passively(argv);
-  constexpr std::array<cli::CommandEntry, 12> kEntries{{
+  constexpr std::array<cli::CommandEntry, 13> kEntries{{
       {"build", cli::add_build},
       {"calibrate", cli::add_calibrate},
+      {"predict", cli::add_predict},
       {"inspect", cli::add_inspect_with_sheets},
       {"overlay", cli::add_overlay},
       {"report", cli::add_report},

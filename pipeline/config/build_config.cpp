@@ -39,15 +39,23 @@ bool is_version(std::string_view text) {
 }
 
 // Reads the keys that only labels of one's own have: their keypoints are not known beforehand.
+// Photographs have no keypoints, but they have a species, and their boxes have scores.
+bool takes_setting(const std::string& format, const std::string& key) {
+  if (format == "photographs") return key == "species" || key == "min_confidence";
+  return loaders::formats::takes_topology(format);
+}
+
 void read_own_labels(JsonFields& fields, DatasetConfig& dataset) {
-  const bool is_own = loaders::formats::takes_topology(dataset.format);
   for (const Setting<DatasetConfig>& setting : own_label_settings()) {
-    require(is_own || fields.child(setting.key) == nullptr, fields.where(),
+    if (takes_setting(dataset.format, setting.key)) {
+      read_setting(fields, setting, dataset);
+      continue;
+    }
+    require(fields.child(setting.key) == nullptr, fields.where(),
             fmt::format("\"{}\" belongs to the formats whose keypoints a topology describes (coco, "
                         "deeplabcut, sleap, lightning_pose), got it with \"{}\"",
                         setting.key, dataset.format));
   }
-  if (is_own) read_settings(fields, own_label_settings(), dataset);
   require(dataset.categories.empty() || dataset.format == "coco", fields.where(),
           "\"categories\" belongs to the format \"coco\"; DeepLabCut's files have none");
   require(
@@ -270,6 +278,16 @@ BuildConfig load_build_config(const std::vector<fs::path>& files, const std::vec
   BuildConfig config = parse_build_config(layers.resolved, layers.where, network_key);
   config.as_written = std::move(layers.as_written);
   return config;
+}
+
+void require_keypoints(const BuildConfig& config) {
+  for (const DatasetConfig& dataset : config.datasets) {
+    if (dataset.format != "photographs") continue;
+    throw run::ConfigError(
+        fmt::format("the dataset \"{}\" has the format \"photographs\": it has no keypoints to "
+                    "judge a prediction by. `quadruped3d predict` gives its bodies",
+                    dataset.name));
+  }
 }
 
 bool needs_network(const BuildConfig& config) {

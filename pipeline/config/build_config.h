@@ -32,8 +32,8 @@ struct DatasetConfig : loaders::formats::DatasetOptions {
   std::string licence{};
   std::string source_url{};
   std::string citation{};
-  bool turns_by_exif = false;         // the labels were made on the pictures as EXIF turns them
-  bool scales_resized = false;        // labels of pictures that were resized since are scaled with them
+  bool turns_by_exif = false;   // the labels were made on the pictures as EXIF turns them
+  bool scales_resized = false;  // labels of pictures that were resized since are scaled with them
 };
 
 struct NetworkConfig {
@@ -135,6 +135,9 @@ void resolve_dataset_paths(nlohmann::json& object, const char* key, const std::f
 // Checks and converts merged JSON; `where` names it in messages.
 BuildConfig parse_build_config(const nlohmann::json& json, const std::string& where,
                                NetworkKey network_key = NetworkKey::required);
+
+// Throws ConfigError that names the first dataset without keypoints, whose predictions nothing can judge.
+void require_keypoints(const BuildConfig& config);
 
 // Whether a dataset has the role `pseudo`. A build that needs no network takes no notice of `network`, `tta`,
 // `filter` and `guards`.

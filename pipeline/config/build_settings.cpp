@@ -75,8 +75,8 @@ const Settings<DatasetConfig>& dataset_settings() {
            "`prima` (Animal3D, CtrlAni3D and every set in the same JSON form), `superanimal` (COCO with 39 "
            "keypoints), `animal_kingdom` (23 keypoints, MPII or COCO style), `stanfordextra`, `badja`; "
            "`coco`, "
-           "`deeplabcut`, `sleap` and `lightning_pose` (any keypoints, described by a topology). See "
-           "docs/datasets.md",
+           "`deeplabcut`, `sleap` and `lightning_pose` (any keypoints, described by a topology); "
+           "`photographs` (no keypoints, for `predict` alone). See docs/datasets.md",
        .words = loaders::formats::dataset_formats(),
        .is_required = true},
       {.key = "root",
@@ -168,7 +168,9 @@ const Settings<DatasetConfig>& own_label_settings() {
            "states one"},
       {.key = "min_confidence",
        .member = &DatasetConfig::min_confidence,
-       .description = "keypoints with a lower confidence get weight 0",
+       .description = "keypoints with a lower confidence get weight 0; of the format `photographs`, boxes "
+                      "with a lower score "
+                      "are left out",
        .range = {.least = 0, .most = 1}},
       {.key = "box_margin",
        .member = &DatasetConfig::box_margin,
