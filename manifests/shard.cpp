@@ -144,11 +144,11 @@ ShardHeader read_header(const TableReader& table) {
   }
   try {
     header.datasets = datasets_from(text("datasets"));
-  } catch (const nlohmann::json::exception& error) {
+  } catch (const nlohmann::json::exception& fault) {
     throw std::runtime_error(
         fmt::format("{}: attribute datasets: {}; expected an object of objects with "
                     "licence, source_url and citation",
-                    table.path().string(), error.what()));
+                    table.path().string(), fault.what()));
   }
   return header;
 }

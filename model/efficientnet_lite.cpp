@@ -127,7 +127,7 @@ EfficientNetLite::EfficientNetLite(const Placement& placement) {
   }
   input_scale_ = torch::tensor(scale, torch::kFloat64).view({1, 3, 1, 1}).to(placement.vector());
   input_shift_ = torch::tensor(shift, torch::kFloat64).view({1, 3, 1, 1}).to(placement.vector());
-  stem_ = std::make_unique<NormedConvolution>(*this, NormedConvolution::Names{"_conv_stem", "_bn0"},
+  stem_ = std::make_shared<NormedConvolution>(*this, NormedConvolution::Names{"_conv_stem", "_bn0"},
                                               NormedConvolution::Sizes{3, kStemChannels, 3, 2, 1}, placement);
   const auto blocks = register_module("_blocks", std::make_shared<torch::nn::Module>());
   std::int64_t channels = kStemChannels;

@@ -36,7 +36,7 @@ class EfficientNetLite : public torch::nn::Module {
  private:
   torch::Tensor input_scale_;  // from PRIMA's normalisation of pictures to this network's
   torch::Tensor input_shift_;
-  std::unique_ptr<NormedConvolution> stem_;
+  std::shared_ptr<NormedConvolution> stem_;
   std::vector<std::shared_ptr<InvertedResidual>> blocks_;
 };
 

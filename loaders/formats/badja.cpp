@@ -114,7 +114,7 @@ class BadjaLoader {
                   const std::string& species) {
     SampleRecord& sample = records_.emplace_back();
     RecordReader reader(record, fmt::format("{}: record [{}]", file.string(), index), sample);
-    set_picture(loading_, reader, reader.text("image_path"), "image_path",
+    set_picture(loading_, reader, {{reader.text("image_path"), "image_path"}},
                 fmt::format("{}-{}", file.stem().string(), index), sample);
     const std::vector<Keypoint> points = read_joints(record, reader, topology_.keypoints.size());
     sample.keypoints = keypoints::to_animal3d(topology_, points);

@@ -202,10 +202,9 @@ class DeepLabCutLoader {
     if (const std::string doubt = numbered.doubt(table.rows); !first_frame && !doubt.empty()) {
       throw std::runtime_error(fmt::format(
           "{}: got {} in {}, so it is not certain which picture shows which frame; expected pictures with "
-          "the "
-          "frames' own numbers. Set the key \"first_frame\" of the dataset to the number of the picture that "
-          "shows frame 0 (1 for pictures that ffmpeg numbered, 0 if the pictures have the frames' own "
-          "numbers)",
+          "the frames' own numbers. Set the key \"first_frame\" of the dataset to the number of the picture "
+          "that shows frame 0: 1 for pictures that ffmpeg numbered, 0 if the pictures have the frames' own "
+          "numbers",
           file.string(), doubt, folder.string()));
     }
     loading_.notes.add(fmt::format(

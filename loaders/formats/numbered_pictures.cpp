@@ -41,17 +41,17 @@ std::string NumberedPictures::doubt(const std::vector<std::string>& rows) const 
   if (names_.empty()) return {};
   std::set<std::int64_t> frames;
   for (const std::string& row : rows) frames.insert(number_in(row));
-  const auto has_picture = [&](std::int64_t frame) { return names_.contains(frame); };
-  if (std::all_of(frames.begin(), frames.end(), has_picture)) return {};
   const std::int64_t first = names_.begin()->first;
   const std::int64_t last = names_.rbegin()->first;
+  const bool have_all =
+      std::all_of(frames.begin(), frames.end(), [&](std::int64_t frame) { return names_.contains(frame); });
+  if (have_all && names_.size() == frames.size()) return {};
   const bool are_as_many = names_.size() == frames.size() && names_.size() > 1;
   const bool have_others = std::any_of(names_.begin(), names_.end(),
                                        [&](const auto& each) { return !frames.contains(each.first); });
-  const bool are_counted_from_1 = first == 1 &&
-                                  last - first + 1 == static_cast<std::int64_t>(names_.size()) &&
-                                  !has_picture(0) && frames.contains(0);
-  if (!are_as_many && !have_others && !are_counted_from_1) return {};
+  const bool are_counted_from_1 =
+      first == 1 && names_.size() > 1 && last == static_cast<std::int64_t>(names_.size());
+  if (!are_counted_from_1 && (have_all || (!are_as_many && !have_others))) return {};
   return fmt::format("{} frames numbered {} to {} and {} pictures numbered {} to {}", frames.size(),
                      *frames.begin(), *frames.rbegin(), names_.size(), first, last);
 }

@@ -18,8 +18,9 @@ class NumberedPictures {
   explicit NumberedPictures(const std::filesystem::path& folder);
 
   // Says why frames and pictures may be counted from different numbers; empty if there is no doubt. `rows`
-  // are the numbers of the frames. There is doubt if a frame has no picture, and the pictures are as many as
-  // the frames, have numbers that no frame has, or are numbered from 1 without a gap, as ffmpeg does it.
+  // are the numbers of the frames. There is no doubt if every frame has its picture and every picture its
+  // frame. Otherwise there is doubt if the pictures are numbered from 1 without a gap, as ffmpeg does it, or
+  // if a frame has no picture while there are as many pictures as frames, or pictures of other numbers.
   std::string doubt(const std::vector<std::string>& rows) const;
 
   // Returns the picture of a frame, where `first_frame` is the number of the picture that shows frame 0. If

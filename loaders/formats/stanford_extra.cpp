@@ -30,7 +30,7 @@ SampleRecord read_dog(const nlohmann::json& record, std::size_t index, const key
                       Loading& loading) {
   SampleRecord sample;
   RecordReader reader(record, fmt::format("{}: record [{}]", loading.file.string(), index), sample);
-  set_picture(loading, reader, reader.text("img_path"), "img_path", std::to_string(index), sample);
+  set_picture(loading, reader, {{reader.text("img_path"), "img_path"}}, std::to_string(index), sample);
   sample.width_px = reader.size_px("img_width");
   sample.height_px = reader.size_px("img_height");
   sample.box = reader.box("img_bbox");

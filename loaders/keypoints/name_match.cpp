@@ -23,11 +23,11 @@ void require_enough_in_common(const Topology& topology, std::span<const std::str
                               const NameMatch& match) {
   const std::size_t known = topology.keypoints.size() - match.missing.size();
   if (known > 0 && 2 * known >= std::min(names_in_file.size(), topology.keypoints.size())) return;
-  throw std::invalid_argument(fmt::format(
-      "got the keypoint names {}; {} of them in the topology {}, expected most of its names {}. Give the "
-      "topology the file's own names",
-      fmt::join(names_in_file, ", "), known == 0 ? "none is" : fmt::format("only {} are", known),
-      topology.name, fmt::join(topology.keypoints, ", ")));
+  throw std::invalid_argument(
+      fmt::format("got the keypoint names {}; {} in the topology {}, expected most of its names {}. Give the "
+                  "topology the file's own names",
+                  fmt::join(names_in_file, ", "), known == 0 ? "none is" : fmt::format("only {} are", known),
+                  topology.name, fmt::join(topology.keypoints, ", ")));
 }
 
 }  // namespace

@@ -24,7 +24,16 @@ bool is_same_point(const Keypoint& a, const Keypoint& b) {
          (std::abs(a.x_px - b.x_px) <= kRoundingPx && std::abs(a.y_px - b.y_px) <= kRoundingPx);
 }
 
+bool is_same_box(const manifests::Box& a, const manifests::Box& b) {
+  return std::abs(a.x_px - b.x_px) <= kRoundingPx && std::abs(a.y_px - b.y_px) <= kRoundingPx &&
+         std::abs(a.w_px - b.w_px) <= kRoundingPx && std::abs(a.h_px - b.h_px) <= kRoundingPx;
+}
+
+// Records without keypoints (photographs) are the same animal if they have the same box.
 bool is_same_animal(const Candidate& a, const Candidate& b) {
+  const bool has_keypoints = std::any_of(a.record.keypoints.begin(), a.record.keypoints.end(),
+                                         [](const Keypoint& point) { return point.weight > 0.0F; });
+  if (!has_keypoints && !is_same_box(a.record.box, b.record.box)) return false;
   return a.role == b.role && a.record.orientation == b.record.orientation &&
          std::equal(a.record.keypoints.begin(), a.record.keypoints.end(), b.record.keypoints.begin(),
                     is_same_point);

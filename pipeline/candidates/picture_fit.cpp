@@ -100,8 +100,7 @@ class PictureFit {
         notes_.count(
             "the picture has an EXIF orientation that turns it, and its labels are taken for the pixels as "
             "stored. If they were made on the turned picture, as browsers and most labelling tools show it, "
-            "set "
-            "\"orientation\": \"exif\" in the dataset",
+            "set \"orientation\": \"exif\" in the dataset",
             record.id, NoteKind::caution);
       }
       return true;
@@ -109,8 +108,7 @@ class PictureFit {
     if (options_.turns_by_exif && agrees(stated, stored)) {
       notes_.count(
           "the stated size is that of the stored pixels, while the labels are taken for the picture as EXIF "
-          "turns "
-          "it",
+          "turns it",
           record.id);
       return true;
     }

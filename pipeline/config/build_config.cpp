@@ -57,10 +57,10 @@ void read_own_labels(JsonFields& fields, DatasetConfig& dataset) {
                         setting.key, dataset.format));
   }
   require(dataset.categories.empty() || dataset.format == "coco", fields.where(),
-          "\"categories\" belongs to the format \"coco\"; DeepLabCut's files have none");
-  require(
-      !dataset.first_frame || dataset.format == "deeplabcut", fields.where(),
-      "\"first_frame\" belongs to the format \"deeplabcut\", whose predictions number the frames of a video");
+          "\"categories\" belongs to the format \"coco\"; other files have none");
+  require(!dataset.first_frame || dataset.format != "coco", fields.where(),
+          "\"first_frame\" is for tables whose rows number the frames of a video; COCO's files name their "
+          "pictures");
 }
 
 DatasetConfig parse_dataset(const json& object, const std::string& where) {

@@ -157,9 +157,10 @@ const Settings<DatasetConfig>& own_label_settings() {
       {.key = "first_frame",
        .member = &DatasetConfig::first_frame,
        .description =
-           "`deeplabcut` only, for predictions of a video: the number of the picture that shows frame 0 (1 "
-           "for "
-           "pictures that ffmpeg numbered). Without it the pictures must have the frames' own numbers",
+           "for tables whose rows number the frames of a video (not `coco`): the number of the picture that "
+           "shows frame 0, 1 for pictures that ffmpeg numbered. Without it the pictures must have the "
+           "frames' "
+           "own numbers",
        .range = {.least = 0}},
       {.key = "species",
        .member = &DatasetConfig::species,

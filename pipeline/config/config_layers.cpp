@@ -48,7 +48,7 @@ ConfigLayers read_config_layers(const std::vector<fs::path>& files,
     apply_override(parse_override(setting), resolve_paths, fs::current_path(), layers.resolved,
                    layers.as_written);
   }
-  if (!settings.empty()) layers.where += " + --set";
+  if (!settings.empty()) layers.where += layers.where.empty() ? "--set" : " + --set";
   return layers;
 }
 

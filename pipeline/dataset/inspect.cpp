@@ -8,6 +8,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "loaders/keypoints/topology.h"
 #include "manifests/atomic_file.h"
 #include "manifests/record_json.h"
 #include "pipeline/dataset/published_dataset.h"
@@ -19,11 +20,15 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
-// The row of a shard that holds this id.
+// The row of a shard that holds this id, else the only one whose id contains it.
 std::optional<std::int64_t> row_of(const manifests::ShardReader& shard, const std::string& id) {
   const std::vector<std::string> ids = shard.table().text("id", 0, shard.rows());
   const auto found = std::find(ids.begin(), ids.end(), id);
-  return found == ids.end() ? std::nullopt : std::optional<std::int64_t>(found - ids.begin());
+  if (found != ids.end()) return found - ids.begin();
+  const auto contains = [&](const std::string& each) { return each.find(id) != std::string::npos; };
+  const auto first = std::find_if(ids.begin(), ids.end(), contains);
+  const bool is_only = first != ids.end() && std::none_of(first + 1, ids.end(), contains);
+  return is_only ? std::optional<std::int64_t>(first - ids.begin()) : std::nullopt;
 }
 
 ordered_json describe_judgement(const manifests::Judgement& judgement) {
@@ -75,6 +80,7 @@ ordered_json describe_shard(const fs::path& path) {
           {"dataset", shard.header.dataset},
           {"unit", shard.header.unit},
           {"images", manifests::to_string(shard.header.image_encoding)},
+          {"keypoint_names", loaders::keypoints::topology("animal3d26").keypoints},
           {"samples", samples}};
 }
 
@@ -85,6 +91,7 @@ ordered_json describe(const fs::path& path) {
   const PublishedDataset dataset(path);  // refuses what it does not know
   ordered_json document = ordered_json::parse(manifests::read_file(dataset.folder() / "dataset.json"));
   document["folder"] = dataset.folder().string();
+  document["keypoint_names"] = loaders::keypoints::topology("animal3d26").keypoints;
   return document;
 }
 
@@ -95,13 +102,14 @@ FoundSample find_sample(const fs::path& path, const std::string& id) {
     if (row.label) return {dataset.shard_file(dataset.shard_of_unit(row.label->shard)), dataset.sample(row)};
     throw std::runtime_error(fmt::format(
         "{}: {} has no label, so no shard holds it: {} ({}). `quadruped3d explain` tells what is known of it",
-        dataset.folder().string(), id, manifests::to_string(row.judgement.verdict),
+        dataset.folder().string(), row.id, manifests::to_string(row.judgement.verdict),
         manifests::to_string(row.judgement.reason)));
   }
   const manifests::ShardReader shard(path);
   if (const auto row = row_of(shard, id)) return {path, std::move(shard.samples(*row, 1).front())};
   throw std::runtime_error(
-      fmt::format("{}: no sample {}; verdicts.csv of the dataset lists every candidate with its shard",
+      fmt::format("{}: no sample, or more than one, has the id {} or contains it; verdicts.csv of the "
+                  "dataset lists every candidate with its shard",
                   path.string(), id));
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "loaders/keypoints/topology.h"
 #include "pipeline/dataset/inspect.h"
 #include "pipeline/dataset/published_dataset.h"
 #include "pipeline/dataset/sentences.h"
@@ -140,6 +141,19 @@ std::string places_part(const PublishedDataset& dataset) {
   return text;
 }
 
+// The order of the 26 in every array of keypoints, with the number of each row's first.
+std::string keypoints_part() {
+  constexpr std::size_t kPerLine = 6;
+  const std::vector<std::string>& names = loaders::keypoints::topology("animal3d26").keypoints;
+  std::string text = "\nThe 26 keypoints, in the order of every array of keypoints\n";
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const bool ends_line = i % kPerLine == kPerLine - 1 || i + 1 == names.size();
+    if (i % kPerLine == 0) text += fmt::format("  {:>2}  ", i);
+    text += names[i] + (ends_line ? "\n" : ", ");
+  }
+  return text;
+}
+
 // The lines can be pasted into a shell, remarks included.
 std::string next_part(const PublishedDataset& dataset) {
   const std::string folder = dataset.folder().string();
@@ -168,6 +182,7 @@ std::string shard_page(const fs::path& path) {
   if (ids.size() > kMostRows) {
     text += fmt::format("    and {} more; --json lists all of them\n", ids.size() - kMostRows);
   }
+  text += keypoints_part();
   if (ids.empty()) return text;
   return text +
          fmt::format("next: {}\n", run::command_line({"inspect", path.string(), "--sample", ids.front()}));
@@ -181,7 +196,7 @@ std::string page(const fs::path& path) {
   const DatasetManifest& manifest = dataset.manifest();
   return fmt::format("{} {} ({})\n", manifest.name, manifest.version, dataset.version_name()) +
          verdicts_part(manifest) + reasons_part(manifest) + labels_part(manifest) + groups_part(manifest) +
-         rules_part(manifest) + places_part(dataset) + next_part(dataset);
+         rules_part(manifest) + keypoints_part() + places_part(dataset) + next_part(dataset);
 }
 
 std::string sample_page(const fs::path& path, const std::string& id) {
@@ -190,7 +205,7 @@ std::string sample_page(const fs::path& path, const std::string& id) {
   const manifests::Judgement& judgement = sample.judgement;
   const auto visible = std::count_if(record.keypoints.begin(), record.keypoints.end(),
                                      [](const manifests::Keypoint& point) { return point.weight > 0.0F; });
-  std::string text = id + '\n';
+  std::string text = record.id + '\n';
   text += line("label",
                fmt::format("{}. {}", manifests::to_string(sample.label_kind), sentence(sample.label_kind)));
   text += line("L_proj", fmt::format("{} as predicted, {} in the end (crop side = 1)",

@@ -47,6 +47,15 @@ class BodyPage(unittest.TestCase):
         vertices = json.loads((ROOT / "tools" / "keypoint_vertices.json").read_text())["keypoints"]
         self.assertEqual([group["name"] for group in vertices], names)
 
+    def test_the_shard_format_lists_them_in_order(self):
+        page = (ROOT / "docs" / "shard-format.md").read_text()
+        section = page.split("\n### The order of the 26 keypoints\n")[1].split("\n## ")[0]
+        rows = [[cell.strip(" `") for cell in line.strip("|").split("|")]
+                for line in section.splitlines() if line.startswith("|")][2:]
+        listed = {int(row[at]): row[at + 1] for row in rows for at in (0, 2)}
+        vertices = json.loads((ROOT / "tools" / "keypoint_vertices.json").read_text())["keypoints"]
+        self.assertEqual(listed, {i: group["name"] for i, group in enumerate(vertices)})
+
     def test_joints_are_those_of_the_skeleton(self):
         source = source_with("kJoints = {{").split("kJoints = {{")[1].split("}};")[0]
         joints = re.findall(r'\{"([a-z_0-9]+)", (-?\d+), Part::', source)

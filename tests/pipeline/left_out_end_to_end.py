@@ -113,10 +113,9 @@ class LeftOut(Case):
         for name, picture in test.items():
             if picture is not None:
                 picture.save(images / name, **({"quality": 30} if not name.endswith("png") else {}))
-        record = self.scene.records[0]
-        write_annotations(root, [{**record, "img_path": f"images/{n}", "bbox": [4, 4, 60, 50]} for n in names])
-        write_annotations(root, [{**record, "img_path": f"images/{n}", "bbox": [4, 4, 60, 50]} for n in test],
-                          "test.json")
+        record = {"bbox": [4, 4, 60, 50], "keypoint_2d": [[6 + 2 * k, 6 + k, 1] for k in range(26)]}
+        write_annotations(root, [{**record, "img_path": f"images/{n}"} for n in names])
+        write_annotations(root, [{**record, "img_path": f"images/{n}"} for n in test], "test.json")
         pool = prima_dataset("planted", "pool")
         held_out = prima_dataset("planted", "held", "test.json", "test")
         return self.scene.write_config("planted.json", datasets=[pool], leakage={"test_sets": [held_out]})

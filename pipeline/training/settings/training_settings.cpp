@@ -73,9 +73,10 @@ const Settings<TrainingConfig>& training_settings() {
        .decides = DecidedStage::weights},
       {.key = "frozen_stem_blocks",
        .member = &TrainingConfig::frozen_stem_blocks,
-       .description =
-           "the first convolution and so many of the 11 blocks of an EfficientNet stem keep their values. The "
-           "first blocks see the most pixels, so freezing them saves much of a step's time; 0 freezes nothing",
+       .description = "the first convolution and so many of the 11 blocks of an EfficientNet stem keep their "
+                      "values. The "
+                      "first blocks see the most pixels, so freezing them saves much of a step's time; 0 "
+                      "freezes nothing",
        .range = {.least = 0, .most = kMostStemBlocks},
        .decides = DecidedStage::weights},
       {.key = "weight_decay",

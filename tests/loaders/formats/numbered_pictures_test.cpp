@@ -36,6 +36,7 @@ TEST_F(Numbered, no_doubt_where_every_frame_has_its_picture) {
   EXPECT_EQ(with(0, 4).doubt(rows(0, 4)), "");
   EXPECT_EQ(with(0, 9).doubt(rows(0, 4)), "");
   EXPECT_EQ(with(5, 4).doubt(rows(5, 4)), "");
+  EXPECT_EQ(with(1, 4).doubt(rows(1, 4)), "") << "rows that count from 1 too";
   EXPECT_EQ(with(0, 0).doubt(rows(0, 4)), "") << "no pictures at all: each frame fails by itself";
 }
 
@@ -50,6 +51,8 @@ TEST_F(Numbered, doubt_where_counts_are_shifted) {
               HasSubstr("4 frames numbered 0 to 3 and 4 pictures numbered 1 to 4"));
   EXPECT_NE(with(1, 3).doubt(rows(0, 4)), "") << "a picture too few";
   EXPECT_NE(with(1, 5).doubt(rows(0, 4)), "") << "a picture too many";
+  EXPECT_NE(with(1, 9).doubt({"5", "7"}), "")
+      << "single labelled frames, and all pictures as ffmpeg numbers them";
   EXPECT_NE(with(100, 4).doubt(rows(0, 4)), "");
   EXPECT_NE(with(0, 4).doubt(rows(1, 4)), "");
 }

@@ -50,6 +50,14 @@ TEST(Duplicates, other_animals_are_no_duplicates) {
       << "where an unlabelled point lies says nothing";
 }
 
+TEST(Duplicates, photographs_without_keypoints_go_by_their_boxes) {
+  std::vector<Candidate> photographs{candidate("1"), candidate("2"), candidate("3")};
+  for (Candidate& each : photographs) each.record.keypoints[3].weight = 0.0F;
+  for (Candidate& each : photographs) each.record.box = {10.0, 10.0, 80.0, 60.0};
+  photographs[1].record.box.x_px = 90.0;
+  EXPECT_EQ(reasons(photographs), (std::vector{Reason::none, Reason::none, Reason::duplicate}));
+}
+
 TEST(Duplicates, labels_of_another_role_and_failed_ones_do_not_count) {
   Candidate truth = candidate("2");
   truth.role = config::Role::truth;

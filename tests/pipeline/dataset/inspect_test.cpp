@@ -51,6 +51,25 @@ TEST_F(Inspect, AShardAndASampleHavePagesToo) {
   }
 }
 
+TEST_F(Inspect, NamesTheKeypointsInTheOrderOfTheArrays) {
+  for (const auto& path : {version_, version_ / "shards/000001.h5"}) {
+    EXPECT_THAT(page(path), HasSubstr("\n   0  left_eye, right_eye, chin, left_front_paw, "));
+    EXPECT_THAT(page(path), HasSubstr("nose, tail_mid\n"));
+    const auto names = describe(path).at("keypoint_names").get<std::vector<std::string>>();
+    ASSERT_EQ(names.size(), 26U);
+    EXPECT_EQ(names[3], "left_front_paw");
+    EXPECT_EQ(names[25], "tail_mid");
+  }
+}
+
+TEST_F(Inspect, ASampleIsFoundByAPartOfItsId) {
+  for (const auto& path : {version_, version_ / "shards/000000.h5"}) {
+    EXPECT_EQ(describe_sample(path, "a.jpg").at("record").at("id"), "zoo/train/a.jpg#0");
+    EXPECT_THAT(sample_page(path, "a.jpg"), HasSubstr("zoo/train/a.jpg#0\n"));
+    EXPECT_THROW(describe_sample(path, "nobody"), std::runtime_error);
+  }
+}
+
 TEST_F(Inspect, ASampleWithoutALabelIsNamedWithItsReason) {
   try {
     find_sample(version_, "pool/test/c.jpg#2");

@@ -84,6 +84,7 @@ class Leakage : public ::testing::Test {
             {"format", "prima"},
             {"root", root().string()},
             {"annotations", folder + ".json"},
+            {"orientation", orientation_},
             {"role", "2d_only"}};
   }
 
@@ -126,6 +127,7 @@ class Leakage : public ::testing::Test {
   }
 
   q3d::testing::ScratchDir scratch_;
+  std::string orientation_ = "stored";
 };
 
 TEST_F(Leakage, planted_copies_are_found_and_nothing_else) {
@@ -162,6 +164,36 @@ TEST_F(Leakage, planted_copies_are_found_and_nothing_else) {
   EXPECT_EQ(document["groups"], json::parse(R"([["pool/train/pool/p10.png#4", "pool/train/pool/p11.jpg#5"],
                                                        ["pool/train/pool/p9.png#13", "pool/train/pool/q9.png#14"]])"));
   EXPECT_EQ(document["leaks_by_evidence"], (json{{"same file", 1}, {"same origin", 1}, {"looks alike", 5}}));
+}
+
+// A phone's picture, stored on its side with an EXIF orientation, and an upright copy of it in the test set.
+TEST_F(Leakage, a_picture_that_its_dataset_turns_is_compared_as_turned) {
+  cv::Mat stored;
+  cv::rotate(drawn(20), stored, cv::ROTATE_90_COUNTERCLOCKWISE);
+  save("pool/phone.jpg", stored);
+  std::string jpeg = manifests::read_file(root() / "pool/phone.jpg");
+  const char exif[] =
+      "\xff\xe1\0\x22"
+      "Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0";
+  jpeg.insert(2, exif, sizeof(exif) - 1);
+  std::ofstream(root() / "pool/phone.jpg", std::ios::binary) << jpeg;
+  save("test/upright.png", drawn(20));
+  annotate("pool");
+  annotate("test");
+  run("stored", 1);
+  EXPECT_EQ(rows("stored/leaks.csv").size(), 1U)
+      << "only the header: lying on its side it is another picture";
+  orientation_ = "exif";
+  run("turned", 1);
+  ASSERT_EQ(rows("turned/leaks.csv").size(), 2U);
+  EXPECT_THAT(rows("turned/leaks.csv")[1],
+              ElementsAre("pool/train/pool/phone.jpg#0", HasSubstr("/upright.png#"), "looks alike",
+                          HasSubstr("of 64"), "2d_only"));
+  // The hashes of both are remembered in one file.
+  fs::copy(scratch_.path() / "stored/picture_hashes.txt", scratch_.path() / "turned/picture_hashes.txt",
+           fs::copy_options::overwrite_existing);
+  run("turned", 1);
+  EXPECT_EQ(rows("turned/leaks.csv").size(), 2U);
 }
 
 TEST_F(Leakage, the_page_shows_each_pair_once_and_escapes_names) {
