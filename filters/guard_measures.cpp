@@ -63,6 +63,52 @@ double pose_deviation(std::span<const float> rotations, const PosePrior& prior) 
   return std::sqrt(whitened.squaredNorm() / used);
 }
 
+double shape_deviation(std::span<const float> betas, int family, const ShapePrior& prior) {
+  constexpr std::size_t kBetas = manifests::kNumBetas;
+  require_count("shape_deviation", "betas", betas.size(), kBetas);
+  const auto families = static_cast<int>(prior.families.size());
+  if (families == 0 || family < -1 || family >= families) {
+    throw std::invalid_argument("shape_deviation: got the family " + std::to_string(family) + " of " +
+                                std::to_string(families));
+  }
+  using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  const auto size = static_cast<Eigen::Index>(kBetas);
+  const Eigen::VectorXd given = Eigen::Map<const Eigen::VectorXf>(betas.data(), size).cast<double>();
+  double least = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < families; ++i) {
+    if (family >= 0 && i != family) continue;
+    const ShapePrior::Family& own = prior.families[static_cast<std::size_t>(i)];
+    require_count("shape_deviation", "the prior's mean", own.mean.size(), kBetas);
+    require_count("shape_deviation", "the prior's precs", own.precs.size(), kBetas * kBetas);
+    const Eigen::Map<const Eigen::VectorXd> mean(own.mean.data(), size);
+    const Eigen::Map<const Matrix> precs(own.precs.data(), size, size);
+    const Eigen::VectorXd whitened = precs.transpose() * (given - mean);
+    least = std::min(least, std::sqrt(whitened.squaredNorm() / static_cast<double>(kBetas)));
+  }
+  return least;
+}
+
+std::vector<float> mirrored_keypoints(std::span<const float> keypoints, std::span<const int> mirror) {
+  require_count("mirrored_keypoints", "numbers of the keypoints", keypoints.size(), kKeypoints * 3);
+  require_count("mirrored_keypoints", "mirror images", mirror.size(), kKeypoints);
+  std::vector<float> mirrored(keypoints.size());
+  for (std::size_t k = 0; k < kKeypoints; ++k) {
+    const auto other = static_cast<std::size_t>(mirror[k]);
+    mirrored[3 * k] = -keypoints[3 * other];
+    mirrored[3 * k + 1] = keypoints[3 * other + 1];
+    mirrored[3 * k + 2] = keypoints[3 * other + 2];
+  }
+  return mirrored;
+}
+
+double mean_absolute_difference(std::span<const float> a, std::span<const float> b) {
+  require_count("mean_absolute_difference", "numbers", b.size(), a.size());
+  if (a.empty()) throw std::invalid_argument("mean_absolute_difference: got no numbers");
+  double sum = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i) sum += std::abs(double{a[i]} - b[i]);
+  return sum / static_cast<double>(a.size());
+}
+
 std::array<double, 12> relative_limb_lengths(std::span<const float> joints) {
   require_count("relative_limb_lengths", "numbers of the joints", joints.size(), kJoints * 3);
   double spine = 0.0;

@@ -22,6 +22,30 @@ struct PosePrior {
 // std::invalid_argument for wrong counts and for a prior that uses no number.
 double pose_deviation(std::span<const float> rotations, const PosePrior& prior);
 
+// Official code: ShapePriorLoss. One entry a family.
+struct ShapePrior {
+  struct Family {
+    std::vector<double> mean;   // 41 betas
+    std::vector<double> precs;  // 41 x 41, row-major: deviation @ precs has unit variance
+  };
+  std::vector<Family> families;
+};
+
+// Returns how far betas lie from a family's shapes: the root mean square of the whitened deviation, about 1
+// for shapes that the prior was made from. `family` is the index of the family; for -1 the nearest one
+// counts. Throws std::invalid_argument for wrong counts, a family that the prior lacks, and a prior without
+// families.
+double shape_deviation(std::span<const float> betas, int family, const ShapePrior& prior);
+
+// Returns the 3D keypoints of a mirrored picture's body as those of the picture itself: x changes its sign,
+// and left and right change places. keypoints: 26 x 3, camera frame; mirror: the index of each keypoint's
+// mirror image. Throws std::invalid_argument for wrong counts.
+std::vector<float> mirrored_keypoints(std::span<const float> keypoints, std::span<const int> mirror);
+
+// Returns the mean of |a - b| over all numbers of two lists. Throws std::invalid_argument for lists that are
+// empty or of different lengths.
+double mean_absolute_difference(std::span<const float> a, std::span<const float> b);
+
 // Returns the lengths of the twelve leg bones (from shoulder or hip to foot: left fore, right fore, left
 // hind, right hind), divided by the length of the spine, which is measured joint by joint from the root to
 // the withers. A bone's length does not depend on the pose, so posed joints may be given. joints: 35 x 3, any

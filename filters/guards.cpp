@@ -51,24 +51,24 @@ bool is_any_on(const GuardBounds& bounds) {
          bounds.left_right_max > 0.0 || bounds.mask_iou_min > 0.0;
 }
 
-Judgement apply_bounds(Judgement judgement, const LabelMeasures& measures, const GuardBounds& bounds) {
+Judgement apply_bounds(Judgement judgement, const manifests::TrustScores& scores, const GuardBounds& bounds) {
   if (judgement.verdict != Verdict::retained && judgement.verdict != Verdict::refined) return judgement;
-  if (measures.visible < bounds.visible_min) {
+  if (scores.visible < bounds.visible_min) {
     discard(judgement, Reason::too_few_keypoints,
-            fmt::format("{} visible keypoints, visible_min {}", measures.visible, bounds.visible_min));
+            fmt::format("{} visible keypoints, visible_min {}", scores.visible, bounds.visible_min));
   }
-  // A comparison with NaN is false, so NaN never exceeds a bound.
+  // A comparison with NaN is false, so NaN breaks no bound.
   const auto at_most = [&](double value, double bound, Reason reason, const char* name) {
     if (bound > 0.0 && value > bound) {
       discard(judgement, reason, fmt::format("{0} {1:.4g}, {0}_max {2:.4g}", name, value, bound));
     }
   };
-  at_most(measures.pose_deviation, bounds.pose_deviation_max, Reason::pose_implausible, "pose_deviation");
-  at_most(measures.limb_factor, bounds.limb_factor_max, Reason::limbs_implausible, "limb_factor");
-  at_most(measures.left_right, bounds.left_right_max, Reason::left_right_swapped, "left_right");
-  if (measures.mask_iou < bounds.mask_iou_min) {
+  at_most(scores.pose_prior, bounds.pose_deviation_max, Reason::pose_implausible, "pose_deviation");
+  at_most(scores.limbs, bounds.limb_factor_max, Reason::limbs_implausible, "limb_factor");
+  at_most(scores.sides, bounds.left_right_max, Reason::left_right_swapped, "left_right");
+  if (scores.mask < bounds.mask_iou_min) {
     discard(judgement, Reason::mask_mismatch,
-            fmt::format("mask_iou {:.4g}, mask_iou_min {:.4g}", measures.mask_iou, bounds.mask_iou_min));
+            fmt::format("mask_iou {:.4g}, mask_iou_min {:.4g}", scores.mask, bounds.mask_iou_min));
   }
   return judgement;
 }

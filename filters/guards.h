@@ -3,8 +3,6 @@
 // has a value.
 #pragma once
 
-#include <limits>
-
 #include "manifests/verdict.h"
 
 namespace q3d::filters {
@@ -22,20 +20,10 @@ struct GuardBounds {
 void check(const GuardBounds& bounds);
 bool is_any_on(const GuardBounds& bounds);
 
-// The numbers that the bounds apply to; filters/guard_measures.h defines each of them. NaN if there is
-// nothing to measure (no mask, no pair of keypoints); the guard then does not discard the label.
-struct LabelMeasures {
-  int visible = 0;
-  double pose_deviation = std::numeric_limits<double>::quiet_NaN();
-  double limb_factor = std::numeric_limits<double>::quiet_NaN();
-  double left_right = std::numeric_limits<double>::quiet_NaN();
-  double mask_iou = std::numeric_limits<double>::quiet_NaN();
-};
-
-// Turns a kept judgement into a discarded one if the label breaks a bound. The reason is that of the first
-// broken bound in the order of GuardBounds; the detail names all of them. Other judgements are returned
-// unchanged.
-manifests::Judgement apply_bounds(manifests::Judgement judgement, const LabelMeasures& measures,
+// Turns a kept judgement into a discarded one if the label breaks a bound. A score that is NaN, because there
+// is nothing to measure (no mask, no pair of keypoints), breaks none. The reason is that of the first broken
+// bound in the order of GuardBounds; the detail names all of them. Other judgements are returned unchanged.
+manifests::Judgement apply_bounds(manifests::Judgement judgement, const manifests::TrustScores& scores,
                                   const GuardBounds& bounds);
 
 // Returns the number of adaptation steps for a sample with `visible` keypoints: round(iterations * visible /

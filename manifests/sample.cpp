@@ -11,7 +11,7 @@ constexpr std::array<std::string_view, 6> kFamilyNames{"none",    "felidae", "ca
                                                        "equidae", "bovidae", "hippopotamidae"};
 static_assert(kFamilyNames.size() == static_cast<std::size_t>(Family::hippopotamidae) + 2);
 
-constexpr std::array<std::string_view, 37> kReasonNames{
+constexpr std::array<std::string_view, 38> kReasonNames{
     "none",
     "box_missing",
     "box_not_finite",
@@ -49,8 +49,9 @@ constexpr std::array<std::string_view, 37> kReasonNames{
     "mask_mismatch",
     "vetoed",
     "in_test_split",
+    "trust_too_low",
 };
-static_assert(kReasonNames.size() == static_cast<std::size_t>(Reason::in_test_split) + 1);
+static_assert(kReasonNames.size() == static_cast<std::size_t>(Reason::trust_too_low) + 1);
 
 }  // namespace
 

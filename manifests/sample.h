@@ -99,6 +99,8 @@ enum class Reason : std::uint8_t {
   // discarded by the user
   vetoed,
   in_test_split,  // its picture, or a copy of it, is in a test split
+  // discarded by the least trust that the config asks for
+  trust_too_low,
 };
 std::string_view to_string(Reason reason);
 Reason reason_from_string(std::string_view name);  // throws std::invalid_argument on an unknown name

@@ -1,6 +1,7 @@
 #include "pipeline/build/build.h"
 
 #include <chrono>
+#include <cmath>
 #include <map>
 #include <memory>
 #include <optional>
@@ -8,7 +9,9 @@
 #include "manifests/shard.h"
 #include "pipeline/build/measuring_models.h"
 #include "pipeline/build/publish.h"
+#include "pipeline/build/quality.h"
 #include "pipeline/build/workspace.h"
+#include "pipeline/run/log.h"
 #include "pipeline/run/progress.h"
 #include "pipeline/stages/stage_store.h"
 #include "pipeline/unit/decode.h"
@@ -41,7 +44,7 @@ class UnitBuilder {
         judgements_(workspace.ingest().candidates.size()),
         progress_("candidates", static_cast<std::int64_t>(workspace.ingest().candidates.size()),
                   workspace.quiet()) {
-    // By the labels' digest: what a veto leaves out is not measured.
+    // By the labels' digest: what a veto leaves out is not measured. Without pseudo labels there is no key.
     if (!keys.measure.empty()) {
       measurements_.emplace(workspace.out(), "measure", keys.measure, &candidates::Unit::label_digest);
     }
@@ -49,9 +52,8 @@ class UnitBuilder {
 
   void run() {
     if (measurements_) {  // before any work, so that missing priors are told at once
-      workspace_.device().run([this] {
-        measurer_ = std::make_unique<unit::LabelMeasurer>(config_.guards, load_measuring_models(config_));
-      });
+      workspace_.device().run(
+          [this] { measurer_ = std::make_unique<unit::LabelMeasurer>(load_measuring_models(config_)); });
     }
     unit::UnitFlow flow;
     flow.units = static_cast<std::int64_t>(workspace_.ingest().units.size());
@@ -102,7 +104,7 @@ class UnitBuilder {
       unit::judge_unit(work, rules_);
     }
     if (measurements_ && !work.measured) {
-      work.measured = measurer_->measure(work);
+      work.measured = measurer_->measure(work, network);
       unit::judge_unit(work, rules_);
     }
   }
@@ -145,7 +147,7 @@ class UnitBuilder {
   stages::StageStore refinements_;
   stages::StageStore crops_;
   stages::StageStore shards_;
-  std::optional<stages::StageStore> measurements_;        // where the rules measure labels
+  std::optional<stages::StageStore> measurements_;        // where there are pseudo labels
   std::unique_ptr<unit::LabelMeasurer> measurer_;         // made and used on the device's thread
   std::map<std::string, manifests::DatasetTerms> terms_;  // by candidates::dataset_key
   std::vector<manifests::Judgement> judgements_;          // of every candidate, in ingest order
@@ -153,12 +155,34 @@ class UnitBuilder {
   run::Progress progress_;
 };
 
+// The datasets with pseudo labels, by name, with the errors of their predictions.
+std::vector<PoolErrors> pools_of(const config::JudgingRules& rules, const candidates::Ingest& ingest,
+                                 const std::vector<manifests::Judgement>& judgements) {
+  std::map<std::string, PoolErrors> pools;
+  for (const auto& [name, thresholds] : rules.thresholds) pools[name] = {name, true, {}, thresholds.tau_high};
+  for (std::size_t i = 0; i < judgements.size(); ++i) {
+    const candidates::Candidate& candidate = ingest.candidates[i];
+    if (candidate.role != config::Role::pseudo) continue;
+    PoolErrors& pool = pools.at(candidate.record.dataset);
+    if (ingest.rendered.count(candidates::dataset_key(candidate.record)) == 0) pool.is_rendered = false;
+    if (!std::isnan(judgements[i].initial_error)) pool.errors.push_back(judgements[i].initial_error);
+  }
+  std::vector<PoolErrors> list;
+  for (auto& [name, pool] : pools) list.push_back(std::move(pool));
+  return list;
+}
+
 }  // namespace
 
 BuildSummary build(const config::BuildConfig& config, const run::RunOptions& options) {
   config::require_keypoints(config);
   const auto start = std::chrono::steady_clock::now();
   const config::JudgingRules rules = config::judging_rules(config);
+  if (!options.above_ceiling) {
+    for (const auto& [name, thresholds] : rules.thresholds) {
+      require_below_ceiling(name, thresholds.tau_high, config.filter.tau_ceiling);
+    }
+  }
   Workspace workspace(config, options);
   const stages::StageKeys keys =
       stages::stage_keys(config, rules, workspace.ingest(), workspace.assets(), workspace.device_key());
@@ -172,12 +196,21 @@ BuildSummary build(const config::BuildConfig& config, const run::RunOptions& opt
     units.run();
     summary.crops_encoded = units.crops_encoded();
     const dataset::DatasetInputs inputs{
-        &config, &rules, &workspace.ingest(), &workspace.assets(), &keys, workspace.device_key()};
+        &config,
+        &rules,
+        &workspace.ingest(),
+        &workspace.assets(),
+        &keys,
+        workspace.device_key(),
+        quality_warnings(pools_of(rules, workspace.ingest(), units.judgements()), workspace.origins(),
+                         config.filter.tau_ceiling)};
     publish(summary.folder, inputs, units.judgements(), units.shards());
   }
   summary.notes = workspace.ingest().notes;
-  point_latest(options.out, summary.folder);
   summary.dataset = dataset::read_dataset_manifest(summary.folder);
+  for (const dataset::Warning& warning : summary.dataset.warnings) run::log_warning(warning.message);
+  require_labels(summary.dataset, summary.folder);
+  point_latest(options.out, summary.folder);
   summary.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return summary;
 }

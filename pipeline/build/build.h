@@ -21,7 +21,10 @@ struct BuildSummary {
 };
 
 // Makes <out>/<name>-<key>/ and points <out>/latest at it; goes on where an earlier run ended. Throws
-// ConfigError, std::runtime_error, Interrupted.
+// ConfigError, std::runtime_error, Interrupted. It also throws std::runtime_error, before any work, if a
+// tau_high is above filter.tau_ceiling (unless options.above_ceiling); and if no label was kept: then the
+// folder is there, with its verdicts, but <out>/latest stays where it was. Warnings about the labels' quality
+// are in summary.dataset.warnings, and were told to the log.
 BuildSummary build(const config::BuildConfig& config, const run::RunOptions& options);
 
 }  // namespace q3d::pipeline::build

@@ -15,9 +15,11 @@
 #include "filters/metrics.h"
 #include "loaders/pictures/crop.h"
 #include "manifests/atomic_file.h"
+#include "pipeline/build/quality.h"
 #include "pipeline/build/workspace.h"
 #include "pipeline/run/errors.h"
 #include "pipeline/run/interrupt.h"
+#include "pipeline/run/log.h"
 #include "pipeline/run/progress.h"
 #include "pipeline/stages/stage_store.h"
 #include "pipeline/unit/crop_keypoints.h"
@@ -186,11 +188,37 @@ filters::CalibratedPool calibrate_pool(const std::string& dataset, const std::ve
   result.dataset = dataset;
   result.adapted = adapt_until_enough(pool, candidates, limits, config, workspace);
   result.calibration = filters::calibrate(pool, config.calibrate, base);
+  if (!workspace.above_ceiling()) {
+    require_below_ceiling(dataset, result.calibration.thresholds.tau_high, config.filter.tau_ceiling);
+  }
   result.judged = static_cast<std::int64_t>(pool.size());
   result.curve = filters::yield_curve(scores, kCurvePoints);
   result.at_tau_low = filters::yield_at(scores, result.calibration.thresholds.tau_low);
   result.at_tau_high = filters::yield_at(scores, result.calibration.thresholds.tau_high);
   return result;
+}
+
+// What can be said of the pool before any label is made. One threshold of all datasets is told for each of
+// them.
+std::vector<dataset::Warning> warnings_of(const std::vector<Scored>& scored,
+                                          const std::vector<filters::CalibratedPool>& calibrated,
+                                          const config::BuildConfig& config, const Workspace& workspace) {
+  std::map<std::string, PoolErrors> pools;
+  for (const Scored& each : scored) {
+    const manifests::SampleRecord& record = each.candidate->record;
+    PoolErrors& pool =
+        pools.try_emplace(record.dataset, PoolErrors{record.dataset, true, {}, 0.0}).first->second;
+    if (workspace.ingest().rendered.count(candidates::dataset_key(record)) == 0) pool.is_rendered = false;
+    pool.errors.push_back(each.score.initial_error);
+  }
+  std::vector<PoolErrors> list;
+  for (auto& [name, pool] : pools) {
+    for (const filters::CalibratedPool& each : calibrated) {
+      if (each.dataset.empty() || each.dataset == name) pool.tau_high = each.calibration.thresholds.tau_high;
+    }
+    list.push_back(std::move(pool));
+  }
+  return quality_warnings(list, workspace.origins(), config.filter.tau_ceiling);
 }
 
 // All candidates under the empty name, or those of each dataset with pseudo labels under its own.
@@ -221,9 +249,12 @@ CalibrationSummary calibrate(const config::BuildConfig& config, const run::RunOp
   Workspace workspace(config, options);
   CalibrationSummary summary;
   summary.candidates = static_cast<std::int64_t>(workspace.ingest().candidates.size());
-  for (const auto& [dataset, candidates] : split_pool(predict_pool(config, workspace), config)) {
+  const std::vector<Scored> scored = predict_pool(config, workspace);
+  for (const auto& [dataset, candidates] : split_pool(scored, config)) {
     summary.pools.push_back(calibrate_pool(dataset, candidates, config, workspace));
   }
+  summary.warnings = warnings_of(scored, summary.pools, config, workspace);
+  for (const dataset::Warning& warning : summary.warnings) run::log_warning(warning.message);
   summary.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return summary;
 }

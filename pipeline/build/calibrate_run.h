@@ -13,6 +13,7 @@ namespace q3d::pipeline::build {
 
 struct CalibrationSummary {
   std::vector<filters::CalibratedPool> pools;
+  std::vector<dataset::Warning> warnings;  // why labels of this pool may be worth little; the log told them
   std::int64_t candidates = 0;
   double seconds = 0.0;
 };
@@ -20,7 +21,8 @@ struct CalibrationSummary {
 // Predicts every candidate (a later build finds the predictions in the same output folder), then adapts
 // candidates in order of their error, under the guards that change adaptation, until enough of them reach
 // delta. AUC is against the annotated keypoints, by the whole crop. With config.calibrate.per_dataset every
-// dataset is a pool of its own. Throws ConfigError, std::runtime_error, Interrupted.
+// dataset is a pool of its own. Throws ConfigError, std::runtime_error (also if a tau_high is above
+// filter.tau_ceiling, unless options.above_ceiling), Interrupted.
 CalibrationSummary calibrate(const config::BuildConfig& config, const run::RunOptions& options);
 
 // A config layer with the thresholds, for `build --config`.

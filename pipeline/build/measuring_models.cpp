@@ -25,11 +25,12 @@ device::PriorNumbers load_priors(const std::filesystem::path& file) {
 
 unit::MeasuringModels load_measuring_models(const config::BuildConfig& config) {
   unit::MeasuringModels models;
-  if (unit::needs_meshes(config.guards)) {
-    models.meshes = network::load_body_meshes(config.network.smal_asset);
-    network::use_compute_threads(network::compute_threads(config.network));
+  models.meshes = network::load_body_meshes(config.network.smal_asset);
+  network::use_compute_threads(network::compute_threads(config.network));
+  const bool are_given = !config.guards.priors.empty();
+  if (are_given || config::uses_priors(config.guards) || network::has_priors(config.network.checkpoint)) {
+    models.priors = load_priors(config::priors_file(config));
   }
-  if (config::uses_priors(config.guards)) models.priors = load_priors(config::priors_file(config));
   return models;
 }
 

@@ -1,4 +1,4 @@
-// Loads what the guards' bounds measure with.
+// Loads what labels are measured with.
 #pragma once
 
 #include "pipeline/config/build_config.h"
@@ -6,9 +6,9 @@
 
 namespace q3d::pipeline::build {
 
-// Loads the body model and the priors where a bound that is on needs them, and gives the calling thread the
-// network's compute threads. Throws std::runtime_error naming the file, and `guards.priors` when it holds no
-// priors.
+// Loads the body model, and the priors of guards.priors or, where that is empty, of the checkpoint if it
+// holds them; gives the calling thread the network's compute threads. Throws std::runtime_error naming the
+// file, and `guards.priors` when a bound that is on needs priors and there are none.
 unit::MeasuringModels load_measuring_models(const config::BuildConfig& config);
 
 }  // namespace q3d::pipeline::build

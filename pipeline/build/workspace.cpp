@@ -23,6 +23,12 @@ std::filesystem::path made(const std::filesystem::path& folder) {
   return folder;
 }
 
+Origins read_origins(const config::BuildConfig& config) {
+  if (!config::needs_network(config)) return {};
+  return {network::read_domain(config.network.checkpoint),
+          network::is_synthetic_body(config.network.smal_asset)};
+}
+
 }  // namespace
 
 std::size_t flow_threads(int wanted) {
@@ -38,6 +44,7 @@ Workspace::Workspace(const config::BuildConfig& config, const run::RunOptions& o
       digests_(options.out / "digests.txt"),
       assets_(stages::digest_assets(config, digests_)),
       device_key_(config::needs_network(config) ? network::device_key(config.network) : std::string()),
+      origins_(read_origins(config)),
       ingest_(candidates::ingest(config, digests_, network::load_body_meshes)) {
   leakage::leave_out(config, digests_, options.out, options.quiet, ingest_);
   if (!options_.quiet) {
@@ -48,6 +55,13 @@ Workspace::Workspace(const config::BuildConfig& config, const run::RunOptions& o
   for (const candidates::IngestNote& note : ingest_.notes) {
     const bool is_caution = note.kind == loaders::formats::NoteKind::caution;
     if (is_caution || !options_.quiet) run::log_note(note.line());
+  }
+  if (!options_.quiet && config::needs_network(config) &&
+      origins_.domain.pictures == device::Pictures::unknown) {
+    run::log_note(fmt::format(
+        "{} does not say which pictures its network knows, so nothing can be said about whether these are like "
+        "them",
+        config.network.checkpoint.filename().string()));
   }
 }
 

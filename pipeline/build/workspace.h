@@ -9,6 +9,7 @@
 
 #include "manifests/digest.h"
 #include "manifests/lock.h"
+#include "pipeline/build/quality.h"
 #include "pipeline/candidates/ingest.h"
 #include "pipeline/device/device_worker.h"
 #include "pipeline/device/network.h"
@@ -29,9 +30,12 @@ class Workspace {
   const std::filesystem::path& out() const { return options_.out; }
   const candidates::Ingest& ingest() const { return ingest_; }
   const stages::AssetDigests& assets() const { return assets_; }
+  // What network and body say of themselves; nothing when no dataset needs the network.
+  const Origins& origins() const { return origins_; }
   // Empty, like the digests of assets(), when no dataset needs the network.
   const std::string& device_key() const { return device_key_; }
   bool quiet() const { return options_.quiet; }
+  bool above_ceiling() const { return options_.above_ceiling; }
   manifests::DigestCache& digests() { return digests_; }
 
   // The thread on which the network lives.
@@ -47,6 +51,7 @@ class Workspace {
   manifests::DigestCache digests_;
   stages::AssetDigests assets_;
   std::string device_key_;
+  Origins origins_;
   candidates::Ingest ingest_;
   std::unique_ptr<device::Network> network_;
   device::DeviceWorker device_;

@@ -9,6 +9,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "manifests/atomic_file.h"
 #include "manifests/record_json.h"
 #include "pipeline/candidates/body_check.h"
 #include "pipeline/candidates/configured_dataset.h"
@@ -133,6 +134,18 @@ std::vector<std::string> check_truth(const config::DatasetConfig& options,
 
 }  // namespace
 
+bool is_rendered(const std::filesystem::path& root) {
+  const std::filesystem::path folder = std::filesystem::absolute(root / ".").lexically_normal().parent_path();
+  for (const auto& place : {folder, folder.parent_path()}) {
+    const std::filesystem::path file = place / "world.json";
+    if (!std::filesystem::is_regular_file(file)) continue;
+    const auto world = nlohmann::json::parse(manifests::read_file(file), nullptr, false);
+    const auto options = world.is_object() ? world.find("options") : world.end();
+    if (options != world.end() && options->contains("picture_px") && options->contains("seed")) return true;
+  }
+  return false;
+}
+
 std::string dataset_key(const manifests::SampleRecord& record) {
   return record.dataset + "/" + record.split;
 }
@@ -156,6 +169,7 @@ Ingest ingest(const config::BuildConfig& config, manifests::DigestCache& digests
     auto [dataset, digest] = read_dataset(options, digests);
     const std::string name = options.name + "/" + options.split;
     result.annotation_digests[name] = std::move(digest);
+    if (is_rendered(options.root)) result.rendered.insert(name);
     for (auto& record : dataset.records) check_role(options.role, record);
     std::vector<std::string> findings = check_truth(options, load_bodies, dataset);
     for (std::size_t i = 0; i < dataset.records.size(); ++i) {

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -65,6 +66,7 @@ struct Ingest {
   std::vector<Candidate> candidates;  // dataset order of the config, then file order
   std::vector<Unit> units;
   std::map<std::string, std::string> annotation_digests;  // "name/split" -> SHA-256 of its annotation files
+  std::set<std::string> rendered;  // "name/split" of those whose pictures `sample` rendered
   std::vector<IngestNote> notes;
 
   // Set by leave_out (pipeline/leakage/exclusions.h).
@@ -80,6 +82,10 @@ struct Ingest {
 // an empty one leaves their bodies unchecked, for callers that look at pictures alone.
 Ingest ingest(const config::BuildConfig& config, manifests::DigestCache& digests,
               const device::BodyMeshesLoader& load_bodies);
+
+// Whether the dataset in this folder is part of a world that `sample` rendered: the folder or the one above
+// it holds the world's world.json. Pictures without this mark count as photographs.
+bool is_rendered(const std::filesystem::path& root);
 
 // Returns a dataset's name and split as one word, "name/split": the key of whatever is listed by dataset.
 std::string dataset_key(const manifests::SampleRecord& record);

@@ -9,6 +9,7 @@
 #include "pipeline/build/build.h"
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/options.h"
+#include "pipeline/dataset/sentences.h"
 #include "pipeline/run/command_line.h"
 #include "pipeline/run/progress.h"
 #include "pipeline/run/words.h"
@@ -25,6 +26,13 @@ struct Arguments {
 
 double percent(std::int64_t part, std::int64_t whole) {
   return whole == 0 ? 0.0 : 100.0 * static_cast<double>(part) / static_cast<double>(whole);
+}
+
+void print_quality(const dataset::DatasetManifest& manifest) {
+  fmt::print(stderr, "  quality     {}\n", dataset::quality_sentence(manifest));
+  for (const dataset::Warning& warning : manifest.warnings) {
+    fmt::print(stderr, "  WARNING     {}\n", warning.message);
+  }
 }
 
 void print_summary(const build::BuildSummary& summary) {
@@ -45,7 +53,9 @@ void print_summary(const build::BuildSummary& summary) {
   for (const auto& [kind, count] : summary.dataset.labels) {
     if (count > 0) fmt::print(stderr, "  {} {}", manifests::to_string(kind), count);
   }
-  fmt::print(stderr, "\n  {} in {}\n",
+  fmt::print(stderr, "\n");
+  print_quality(summary.dataset);
+  fmt::print(stderr, "  {} in {}\n",
              run::counted(static_cast<std::int64_t>(summary.dataset.shards.size()), "shard"),
              summary.folder.string());
   fmt::print(stderr, "  all verdicts: {}\n", (summary.folder / "verdicts.csv").string());
@@ -74,6 +84,8 @@ nlohmann::ordered_json to_json(const build::BuildSummary& summary) {
           {"content_id", summary.dataset.content_id},
           {"reasons", to_json(summary.dataset.reasons)},
           {"notes", dataset::notes_json(summary.notes)},
+          {"quality", dataset::quality_sentence(summary.dataset)},
+          {"warnings", dataset::to_json(summary.dataset.warnings)},
           {"up_to_date", summary.was_up_to_date},
           {"crops_encoded", summary.crops_encoded},
           {"seconds", summary.seconds}};
@@ -102,6 +114,7 @@ Command add_build(CLI::App& app) {
                    "file with the ids of samples to leave out, one per line; a reason may follow after a tab")
       ->check(CLI::ExistingFile);
   threads_option(*command, arguments->run.threads);
+  above_ceiling_flag(*command, arguments->run.above_ceiling);
   json_flag(*command, arguments->json);
   quiet_flag(*command, arguments->run.quiet);
   command->footer(

@@ -47,6 +47,9 @@ void print_summary(const build::CalibrationSummary& summary, const Arguments& ar
   fmt::print(stderr, "\ncalibrated on {} in {}\n", run::counted(summary.candidates, "candidate"),
              run::human_duration(summary.seconds));
   for (const filters::CalibratedPool& pool : summary.pools) print_pool(pool);
+  for (const dataset::Warning& warning : summary.warnings) {
+    fmt::print(stderr, "WARNING: {}\n", warning.message);
+  }
   fmt::print(stderr, "\n");
   fmt::print("{}", build::thresholds_layer(summary));
   if (!arguments.figure.empty()) fmt::print(stderr, "wrote {}\n", arguments.figure.string());
@@ -87,7 +90,8 @@ nlohmann::ordered_json to_json(const build::CalibrationSummary& summary) {
   return {{"candidates", summary.candidates},
           {"judged", judged},
           {"adapted", adapted},
-          {"pools", std::move(pools)}};
+          {"pools", std::move(pools)},
+          {"warnings", dataset::to_json(summary.warnings)}};
 }
 
 }  // namespace
@@ -104,6 +108,7 @@ Command add_calibrate(CLI::App& app) {
   command->add_option("-f,--figure", arguments->figure,
                       "write an SVG figure of yield and AUC against the threshold");
   threads_option(*command, arguments->run.threads);
+  above_ceiling_flag(*command, arguments->run.above_ceiling);
   json_flag(*command, arguments->json);
   quiet_flag(*command, arguments->run.quiet);
   command->footer(

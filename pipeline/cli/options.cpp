@@ -47,6 +47,11 @@ CLI::Option* json_flag(CLI::App& command, bool& json, const std::string& text) {
   return command.add_flag("--json", json, text);
 }
 
+CLI::Option* above_ceiling_flag(CLI::App& command, bool& above_ceiling) {
+  return command.add_flag("--above-ceiling", above_ceiling,
+                          "go on with a tau_high above filter.tau_ceiling; a warning stays");
+}
+
 CLI::Option* quiet_flag(CLI::App& command, bool& quiet) {
   return command.add_flag("-q,--quiet", quiet, "do not show progress");
 }

@@ -40,6 +40,8 @@ CLI::Option* threads_option(
 // --json
 CLI::Option* json_flag(CLI::App& command, bool& json,
                        const std::string& text = "print a machine-readable summary to stdout");
+// --above-ceiling
+CLI::Option* above_ceiling_flag(CLI::App& command, bool& above_ceiling);
 // -q,--quiet
 CLI::Option* quiet_flag(CLI::App& command, bool& quiet);
 

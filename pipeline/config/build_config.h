@@ -69,6 +69,8 @@ struct FilterConfig {
   std::optional<double> tau_low;  // crop units; absent until calibrated
   std::optional<double> tau_high;
   double delta = 0.05;
+  double tau_ceiling = 0.1;                           // crop units; a tau_high above it is refused
+  double min_trust = 0.0;                             // of a kept label's combined trust; 0 = off
   std::map<std::string, DatasetThresholds> datasets;  // by the dataset's name
 };
 

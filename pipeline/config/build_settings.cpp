@@ -130,9 +130,9 @@ const Settings<DatasetConfig>& dataset_settings() {
        .words = {"file", "body"}},
       {.key = "licence",
        .member = &DatasetConfig::licence,
-       .description = "the licence of pictures and annotations, best as an SPDX identifier (`CC-BY-4.0`). "
-                      "The dataset and "
-                      "each of its shards repeat it"},
+       .description =
+           "the licence of pictures and annotations, best as an SPDX identifier (`CC-BY-4.0`). The "
+           "dataset and each of its shards repeat it"},
       {.key = "source_url",
        .member = &DatasetConfig::source_url,
        .description = "where the dataset came from. Repeated likewise"},
@@ -256,20 +256,18 @@ const Settings<TtaConfig>& tta_settings() {
       {.key = "stop_below",
        .member = &TtaConfig::stop_below,
        .description =
-           "crop units. Adaptation ends as soon as L_proj is below it; 0 is never, as in the paper. At most "
-           "`tau_low`. A sample that ends there before the tenth iteration is kept without the test of "
-           "`delta`. With the value of `tau_low` it was the rule until version 0.2; it saves time, and "
-           "labels "
-           "are hardly better than predictions (docs/results.md)",
+           "crop units. Adaptation ends as soon as L_proj is below it; 0 is never, as in the paper. At "
+           "most `tau_low`. A sample that ends there before the tenth iteration is kept without the test "
+           "of `delta`. With the value of `tau_low` this was the rule until version 0.2; it saves time, "
+           "and labels are hardly better than predictions (docs/results.md)",
        .range = kNotNegative,
        .decides = DecidedStage::refine},
       {.key = "refine_retained",
        .member = &TtaConfig::refine_retained,
        .description =
            "if true, predictions below `tau_low` are adapted too, for `iterations_min` iterations and "
-           "without "
-           "the test of `delta`. Each is kept in any case: as refined if an iterate is better, else as "
-           "retained. The paper retains them as they are",
+           "without the test of `delta`. Each is kept in any case: as refined if an iterate is better, "
+           "else as retained. The paper retains them as they are",
        .decides = DecidedStage::refine},
       {.key = "batch",
        .member = &TtaConfig::batch,
@@ -291,7 +289,21 @@ const Settings<FilterConfig>& filter_settings() {
            "adapted. A build without thresholds stops and names `calibrate`"},
       {.key = "delta",
        .member = &FilterConfig::delta,
-       .description = "relative gain that adaptation must reach within ten iterations"}};
+       .description = "relative gain that adaptation must reach within ten iterations"},
+      {.key = "tau_ceiling",
+       .member = &FilterConfig::tau_ceiling,
+       .description =
+           "crop units. `calibrate` and `build` refuse a `tau_high` above it with exit code 1, because "
+           "shares can be met on any pictures. At the default, a keypoint of the worst adapted sample is "
+           "a tenth of the crop's side off in each direction, about the length of a lower leg; a body in "
+           "the middle of the crop that knows nothing of the picture is about 0.2 off. `--above-ceiling` "
+           "goes on all the same",
+       .range = kPositive},
+      {.key = "min_trust",
+       .member = &FilterConfig::min_trust,
+       .description = "discards labels whose combined trust score is below it (`trust_too_low`); 0 is off. "
+                      "docs/filters.md explains the score",
+       .range = {.least = 0, .most = 1}}};
   return kSettings;
 }
 

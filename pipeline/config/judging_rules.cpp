@@ -49,6 +49,7 @@ filters::Thresholds thresholds_of(const std::string& dataset, const BuildConfig&
 JudgingRules judging_rules(const BuildConfig& config) {
   JudgingRules rules;
   rules.guards = config.guards;
+  rules.min_trust = config.filter.min_trust;
   for (const DatasetConfig& dataset : config.datasets) {
     if (dataset.role == Role::pseudo) {
       rules.thresholds.emplace(dataset.name, thresholds_of(dataset.name, config));

@@ -12,11 +12,10 @@ namespace q3d::pipeline::config {
 struct JudgingRules {
   std::map<std::string, filters::Thresholds> thresholds;  // by dataset, of those of role `pseudo`
   GuardConfig guards;
+  double min_trust = 0.0;  // of a kept label's combined trust; 0 = off
 
   // Throws std::out_of_range for a dataset without pseudo labels.
   const filters::Thresholds& of(const std::string& dataset) const { return thresholds.at(dataset); }
-  // Whether labels must be measured before they are judged.
-  bool measures_labels() const { return filters::is_any_on(guards); }
 };
 
 // The rules of a calibrated config; without thresholds when no dataset has the role `pseudo`. A dataset's own

@@ -144,6 +144,10 @@ ordered_json describe_leakage(const DatasetInputs& inputs) {
           {"pictures_alike_in_pool", leakage->in_groups}};
 }
 
+ordered_json text_or_null(const std::string& text) {
+  return text.empty() ? ordered_json(nullptr) : ordered_json(text);
+}
+
 // Where the samples come from, and under which terms.
 ordered_json describe_datasets(const config::BuildConfig& config) {
   const auto terms = terms_of_datasets(config);
@@ -158,10 +162,6 @@ ordered_json describe_datasets(const config::BuildConfig& config) {
                       {"citation", own.citation}};
   }
   return datasets;
-}
-
-ordered_json text_or_null(const std::string& text) {
-  return text.empty() ? ordered_json(nullptr) : ordered_json(text);
 }
 
 // Shortest text that reads back as the same number; empty for NaN.
@@ -250,6 +250,7 @@ std::string dataset_json(const DatasetInputs& inputs, const std::vector<manifest
                                  {"guards", describe_guards(inputs)},
                                  {"statistics", statistics(*inputs.ingest, judgements)},
                                  {"notes", notes_json(inputs.ingest->notes)},
+                                 {"warnings", to_json(inputs.warnings)},
                                  {"provenance",
                                   {{"config", inputs.config->as_written},
                                    {"annotations", inputs.ingest->annotation_digests},

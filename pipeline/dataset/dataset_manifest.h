@@ -16,6 +16,7 @@
 #include "manifests/verdict.h"
 #include "pipeline/candidates/ingest.h"
 #include "pipeline/config/build_config.h"
+#include "pipeline/dataset/warnings.h"
 #include "pipeline/stages/stages.h"
 
 namespace q3d::pipeline::dataset {
@@ -75,6 +76,7 @@ struct DatasetManifest {
   std::string device;
   std::vector<ShardEntry> shards;
   std::string verdicts_sha256;
+  std::vector<Warning> warnings;  // why the labels may be worth little
 };
 
 // What the config says of its datasets' terms, by "name/split".
@@ -90,6 +92,7 @@ struct DatasetInputs {
   const stages::AssetDigests* assets = nullptr;
   const stages::StageKeys* keys = nullptr;
   std::string device_key;
+  std::vector<Warning> warnings{};
 };
 
 // A list of {kind, dataset, text}; `dataset` is null where a note concerns the whole pool.

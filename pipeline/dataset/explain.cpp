@@ -27,7 +27,6 @@ struct Evidence {
   std::optional<smal::CropPoints> after;
   std::vector<double> curve;
   std::vector<double> held_out_curve;
-  std::optional<filters::LabelMeasures> measures;
   std::vector<std::string> missing;
 };
 
@@ -54,11 +53,6 @@ void read_stages(const PublishedDataset& dataset, const VerdictRow& row, Evidenc
       evidence.curve = std::move(each.curve);
       evidence.held_out_curve = std::move(each.held_out_curve);
       evidence.after = each.body.keypoints_2d;
-    }
-  }
-  if (const auto measured = dataset.measures(unit)) {
-    for (const unit::MeasuredLabel& each : *measured) {
-      if (each.sample == place) evidence.measures = each.measures;
     }
   }
 }
@@ -113,13 +107,13 @@ ordered_json describe_crop(const manifests::SampleRecord& record) {
           {"patch_from_image", loaders::pictures::patch_from_image(square, loaders::pictures::kPatchSidePx)}};
 }
 
-// What the guards' bounds looked at; null where there was nothing to measure or the bound is off.
-ordered_json describe_measures(const filters::LabelMeasures& measures) {
-  return {{"visible", measures.visible},
-          {"pose_deviation", number_or_null(measures.pose_deviation)},
-          {"limb_factor", number_or_null(measures.limb_factor)},
-          {"left_right", number_or_null(measures.left_right)},
-          {"mask_iou", number_or_null(measures.mask_iou)}};
+// The trust scores; null where there was nothing to measure.
+ordered_json describe_trust(const manifests::TrustScores& trust) {
+  ordered_json scores = ordered_json::object();
+  for (const manifests::TrustColumn& column : manifests::kTrustColumns) {
+    scores[column.name] = number_or_null(trust.*column.score);
+  }
+  return scores;
 }
 
 ordered_json describe_verdict(const VerdictRow& row) {
@@ -168,7 +162,6 @@ void add_evidence(const Evidence& evidence, ordered_json& story) {
     for (const double error : evidence.curve) story["curve"].push_back(number_or_null(error));
   }
   if (!evidence.held_out_curve.empty()) story["held_out_curve"] = evidence.held_out_curve;
-  if (evidence.measures) story["measures"] = describe_measures(*evidence.measures);
 }
 
 }  // namespace
@@ -182,6 +175,7 @@ ordered_json explain(const fs::path& given, const std::string& id) {
   story["verdict"] = describe_verdict(row);
   story["thresholds"] = describe_thresholds(thresholds);
   story["why"] = why(row.judgement, dataset.role(row), thresholds);
+  if (!std::isnan(row.judgement.trust.visible)) story["trust"] = describe_trust(row.judgement.trust);
   story["source"] = describe_source(row, evidence);
   add_evidence(evidence, story);
   if (const auto kind = dataset.label_kind(row)) {

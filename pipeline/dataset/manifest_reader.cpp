@@ -72,6 +72,13 @@ void read_terms(const json& datasets, DatasetManifest& manifest) {
   }
 }
 
+void read_warnings(const json& warnings, DatasetManifest& manifest) {
+  for (const json& each : warnings) {
+    manifest.warnings.push_back({warning_kind_from_string(each.at("kind").get<std::string>()),
+                                 text_of(each.at("dataset")), each.at("message").get<std::string>()});
+  }
+}
+
 // The config stands there as the user wrote it: what is absent has its default.
 void read_config(const json& config, DatasetManifest& manifest) {
   for (const json& dataset : config.at("datasets")) {
@@ -126,6 +133,7 @@ DatasetManifest manifest_of(const json& document) {
   read_statistics(document.at("statistics"), manifest);
   read_thresholds(document.at("thresholds"), manifest);
   if (manifest.schema >= 2) read_terms(document.at("datasets"), manifest);
+  if (document.contains("warnings")) read_warnings(document.at("warnings"), manifest);
   read_provenance(document.at("provenance"), manifest);
   for (const json& shard : document.at("shards")) {
     manifest.shards.push_back({shard.at("file").get<std::string>(), shard.at("sha256").get<std::string>(),

@@ -23,4 +23,10 @@ std::string_view sentence(manifests::LabelKind kind);
 std::string why(const manifests::Judgement& judgement, config::Role role,
                 const std::optional<filters::Thresholds>& thresholds);
 
+struct DatasetManifest;
+
+// How good the labels are, in words: how far they lie from the annotated keypoints, on the scale of the crop,
+// and what this does not say.
+std::string quality_sentence(const DatasetManifest& manifest);
+
 }  // namespace q3d::pipeline::dataset

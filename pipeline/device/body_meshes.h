@@ -23,6 +23,7 @@ struct BodyMesh {
 // The numbers of a file of priors (model/priors.h).
 struct PriorNumbers {
   filters::PosePrior pose;
+  filters::ShapePrior shape;
   std::vector<smal::Betas> family_betas;  // the families' mean shapes
 };
 

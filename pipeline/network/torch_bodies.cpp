@@ -6,6 +6,7 @@
 
 #include "model/device.h"
 #include "model/priors.h"
+#include "pipeline/device/domain.h"
 #include "smal/tensors/body.h"
 #include "smal/tensors/safetensors.h"
 
@@ -82,8 +83,19 @@ std::unique_ptr<device::BodyMeshes> load_body_meshes(const std::filesystem::path
   return std::make_unique<TorchBodyMeshes>(smal::tensors::load_asset(smal_asset));
 }
 
+bool is_synthetic_body(const std::filesystem::path& smal_asset) {
+  const smal::tensors::SafeTensors file = smal::tensors::SafeTensors::open(smal_asset);
+  const auto name = file.metadata().find("name");
+  return name != file.metadata().end() && name->second == device::kSyntheticBodyName;
+}
+
 void use_compute_threads(int threads) {
   model::configure_compute(threads);
+}
+
+bool has_priors(const std::filesystem::path& path) {
+  const smal::tensors::SafeTensors file = smal::tensors::SafeTensors::open(path);
+  return file.contains("pose_prior_loss.mean_pose") && file.contains("shape_prior_loss.mean_betas");
 }
 
 device::PriorNumbers read_priors(const std::filesystem::path& path) {
@@ -92,8 +104,11 @@ device::PriorNumbers read_priors(const std::filesystem::path& path) {
     const torch::Tensor wide = tensor.to(torch::kFloat64).contiguous();
     return std::vector<double>(wide.data_ptr<double>(), wide.data_ptr<double>() + wide.numel());
   };
-  device::PriorNumbers result{{numbers(priors.mean_pose), numbers(priors.precs), numbers(priors.use_index)},
-                              {}};
+  device::PriorNumbers result{
+      {numbers(priors.mean_pose), numbers(priors.precs), numbers(priors.use_index)}, {}, {}};
+  for (std::int64_t i = 0; i < priors.mean_betas.size(0); ++i) {
+    result.shape.families.push_back({numbers(priors.mean_betas[i]), numbers(priors.betas_prec[i])});
+  }
   const torch::Tensor betas = priors.mean_betas.contiguous();
   result.family_betas.resize(static_cast<std::size_t>(betas.size(0)));
   const float* number = betas.data_ptr<float>();

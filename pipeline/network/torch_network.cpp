@@ -15,6 +15,7 @@
 #include "model/tta.h"
 #include "pipeline/run/errors.h"
 #include "smal/numbers.h"
+#include "smal/tensors/safetensors.h"
 
 namespace q3d::pipeline::network {
 namespace {
@@ -44,6 +45,7 @@ void append_rows(const model::Prediction& batch, std::vector<device::BodyPredict
   const torch::Tensor keypoints_3d = on_host(batch.keypoints_3d);
   const torch::Tensor keypoints_2d = on_host(batch.keypoints_2d);
   const torch::Tensor aux_keypoints_2d = on_host(batch.aux_keypoints_2d);
+  const torch::Tensor aux_keypoints_3d = on_host(batch.aux_keypoints_3d);
   for (std::int64_t i = 0; i < rotations.size(0); ++i) {
     device::BodyPrediction& row = rows.emplace_back();
     copy_row(rotations, i, row.pose);
@@ -53,6 +55,7 @@ void append_rows(const model::Prediction& batch, std::vector<device::BodyPredict
     copy_row(keypoints_3d, i, row.keypoints_3d);
     copy_row(keypoints_2d, i, row.keypoints_2d);
     copy_row(aux_keypoints_2d, i, row.aux_keypoints_2d);
+    copy_row(aux_keypoints_3d, i, row.aux_keypoints_3d);
   }
 }
 
@@ -186,6 +189,17 @@ int compute_threads(const config::NetworkConfig& network) {
 std::string device_key(const config::NetworkConfig& network) {
   const bool on_cpu = choose_device(network.device).device.is_cpu();
   return on_cpu ? fmt::format("cpu-{}", compute_threads(network)) : "cuda";
+}
+
+device::NetworkDomain read_domain(const std::filesystem::path& checkpoint) {
+  const smal::tensors::SafeTensors file = smal::tensors::SafeTensors::open(checkpoint);
+  const auto entry = file.metadata().find(device::kDomainKey);
+  if (entry == file.metadata().end()) return {};
+  try {
+    return device::domain_from_json(entry->second);
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(fmt::format("{}: metadata {}", checkpoint.string(), error.what()));
+  }
 }
 
 void write_initial_checkpoint(const std::filesystem::path& path, const std::string& size, std::uint64_t seed,

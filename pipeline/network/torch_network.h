@@ -7,6 +7,7 @@
 #include <string>
 
 #include "pipeline/config/build_config.h"
+#include "pipeline/device/domain.h"
 #include "pipeline/device/network.h"
 
 namespace q3d::pipeline::network {
@@ -27,6 +28,10 @@ int compute_threads(const config::NetworkConfig& network);
 // What of device and threads decides the bits: "cpu-2", "cuda". Part of the stage keys; loads nothing.
 // Throws as load_network does.
 std::string device_key(const config::NetworkConfig& network);
+
+// What the checkpoint says of the pictures that it knows; `unknown` if it says nothing. Throws
+// std::runtime_error naming the file.
+device::NetworkDomain read_domain(const std::filesystem::path& checkpoint);
 
 // A seeded checkpoint of a named size ("vith", "small", "lite", "tiny"), with the weights of the pre-trained
 // stem in the file `stem` unless that is empty. Throws ConfigError for another name, or a stem for a size

@@ -7,8 +7,9 @@ namespace q3d::pipeline::run {
 
 struct RunOptions {
   std::filesystem::path out;
-  int threads = 0;     // of the flow graph; 0 = all cores. Never changes a byte of the result.
-  bool quiet = false;  // no progress on stderr
+  int threads = 0;             // of the flow graph; 0 = all cores. Never changes a byte of the result.
+  bool quiet = false;          // no progress on stderr
+  bool above_ceiling = false;  // go on with a tau_high above filter.tau_ceiling
 };
 
 }  // namespace q3d::pipeline::run

@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "filters/trust.h"
 #include "manifests/atomic_file.h"
 #include "manifests/shard.h"
 #include "pipeline/config/build_settings.h"
@@ -21,12 +22,12 @@ using nlohmann::json;
 
 // Raise a number when a change of the code changes what the stage writes.
 constexpr int kIngestCode = 3;
-constexpr int kPredictCode = 2;
+constexpr int kPredictCode = 3;
 constexpr int kFidelityCode = 2;
 constexpr int kRefineCode = 2;
-constexpr int kMeasureCode = 1;
+constexpr int kMeasureCode = 2;
 constexpr int kCropsCode = 1;
-constexpr int kShardsCode = 1;
+constexpr int kShardsCode = 2;
 
 std::string key_of(const char* stage, int code, json parts) {
   parts["stage"] = stage;
@@ -80,16 +81,6 @@ json refine_parts(const config::TtaConfig& tta, const config::GuardConfig& guard
   return parts;
 }
 
-// What is measured, not what of it is let through.
-json measure_parts(const config::GuardConfig& guards, const AssetDigests& assets) {
-  json parts = {{"pose_deviation", guards.pose_deviation_max > 0.0},
-                {"limb_factor", guards.limb_factor_max > 0.0},
-                {"left_right", guards.left_right_max > 0.0},
-                {"mask_iou", guards.mask_iou_min > 0.0}};
-  if (!assets.priors.empty()) parts["priors"] = assets.priors;
-  return parts;
-}
-
 json bounds_json(const filters::GuardBounds& bounds) {
   return {{"visible_min", bounds.visible_min},
           {"pose_deviation_max", bounds.pose_deviation_max},
@@ -118,7 +109,9 @@ AssetDigests digest_assets(const config::BuildConfig& config, manifests::DigestC
   if (!config::needs_network(config)) return {};
   AssetDigests assets{
       digests.digest(config.network.checkpoint), digests.digest(config.network.smal_asset), {}};
-  if (config::uses_priors(config.guards)) assets.priors = digests.digest(config::priors_file(config));
+  if (config::uses_priors(config.guards) || !config.guards.priors.empty()) {
+    assets.priors = digests.digest(config::priors_file(config));
+  }
   return assets;
 }
 
@@ -156,12 +149,11 @@ StageKeys keys_of_config(const config::BuildConfig& config, const config::Judgin
   keys.refine = key_of("refine", kRefineCode, std::move(refine));
   json shards = config::key_parts(config::shard_settings(), config.shards, config::DecidedStage::shards);
   shards.update({{"refine", keys.refine}, {"schema", manifests::kShardSchema}, {"name", config.name}});
-  if (judges && rules.measures_labels()) {
-    json measure = measure_parts(config.guards, assets);
-    measure["refine"] = keys.refine;
-    keys.measure = key_of("measure", kMeasureCode, std::move(measure));
+  if (judges) {
+    keys.measure = key_of("measure", kMeasureCode, {{"refine", keys.refine}, {"priors", assets.priors}});
     shards["measure"] = keys.measure;
     shards["bounds"] = bounds_json(config.guards);
+    shards["trust"] = {{"version", filters::kTrustVersion}, {"least", rules.min_trust}};
   }
   keys.crops = crops_key(config.shards);
   keys.shards = key_of("shards", kShardsCode, std::move(shards));

@@ -25,7 +25,7 @@ inline constexpr std::size_t kShortKey = 12;  // hex digits of a key that appear
 struct AssetDigests {
   std::string checkpoint;
   std::string smal_asset;
-  std::string priors;  // empty unless a guard needs them
+  std::string priors;  // empty unless a guard needs them or guards.priors names them
 };
 // Throws std::runtime_error when a file is missing.
 AssetDigests digest_assets(const config::BuildConfig& config, manifests::DigestCache& digests);
@@ -37,7 +37,7 @@ struct StageKeys {
   std::string predict;
   std::string fidelity;
   std::string refine;
-  std::string measure;  // what the guards' bounds look at; empty when none is on
+  std::string measure;  // the trust scores; empty when no dataset has pseudo labels
   std::string crops;    // the bytes of stored crops; thresholds and network have no part in it
   std::string shards;
   std::string dataset;  // the version: everything above

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "filters/trust.h"
 #include "pipeline/unit/crop_keypoints.h"
 
 namespace q3d::pipeline::unit {
@@ -44,6 +45,14 @@ manifests::Judgement judge_predicted(const UnitWork& work, std::size_t i, const 
   const candidates::Candidate& candidate = work.candidates[i];
   if (candidate.role != config::Role::pseudo) return judge_annotated(work.errors[i]);
   return filters::judge_initial(work.errors[i], rules.of(candidate.record.dataset));
+}
+
+// Discards a label that is trusted too little.
+void apply_min_trust(double min_trust, manifests::Judgement& judgement) {
+  if (!is_kept(judgement) || !(judgement.trust.combined < min_trust)) return;
+  judgement.verdict = Verdict::discarded;
+  judgement.reason = Reason::trust_too_low;
+  judgement.detail = fmt::format("trust {:.4g}, min_trust {:.4g}", judgement.trust.combined, min_trust);
 }
 
 // Discards a candidate that the user or a test split excludes. It keeps its numbers; a failed one stays
@@ -104,7 +113,10 @@ void judge_unit(UnitWork& work, const config::JudgingRules& rules) {
   if (work.measured) {
     for (const MeasuredLabel& label : *work.measured) {
       manifests::Judgement& judgement = work.judgements[label.sample];
-      judgement = filters::apply_bounds(std::move(judgement), label.measures, rules.guards);
+      judgement.trust = label.scores;
+      judgement.trust.combined = filters::combined_trust(judgement);
+      judgement = filters::apply_bounds(std::move(judgement), label.scores, rules.guards);
+      apply_min_trust(rules.min_trust, judgement);
     }
   }
   for (std::size_t i = 0; i < work.candidates.size(); ++i) {

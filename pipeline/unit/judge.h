@@ -1,4 +1,5 @@
-// The step that judges a unit: the fidelity rule, the guards' bounds, and what the user leaves out.
+// The step that judges a unit: the fidelity rule, the guards' bounds, the least trust, and
+// what the user leaves out.
 #pragma once
 
 #include "filters/fidelity.h"

@@ -1,43 +1,48 @@
-// What the guards' bounds look at, of every label that the fidelity rule keeps.
+// The trust scores of every label that the fidelity rule keeps. The guards' bounds look at some of them.
 #pragma once
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "filters/guard_measures.h"
-#include "pipeline/config/build_config.h"
 #include "pipeline/device/body_meshes.h"
+#include "pipeline/unit/network_source.h"
 #include "pipeline/unit/unit_work.h"
 
 namespace q3d::pipeline::unit {
 
-// What the bounds that are on measure with.
+// What labels are measured with.
 struct MeasuringModels {
-  std::unique_ptr<device::BodyMeshes> meshes;  // where needs_meshes
-  std::optional<device::PriorNumbers> priors;  // where uses_priors
+  std::unique_ptr<device::BodyMeshes> meshes;
+  std::optional<device::PriorNumbers> priors;  // without them the scores that need them are NaN
 };
-bool needs_meshes(const config::GuardConfig& guards);
 
 class LabelMeasurer {
  public:
-  // Throws std::invalid_argument when a model that a bound needs is missing.
-  LabelMeasurer(const config::GuardConfig& guards, MeasuringModels models);
+  // Throws std::invalid_argument without a body model.
+  explicit LabelMeasurer(MeasuringModels models);
 
-  // Of the candidates with pseudo labels that work.judgements keeps, in their order; work.decoded must hold
-  // the masks. A number whose bound is off is NaN.
-  std::vector<MeasuredLabel> measure(const UnitWork& work) const;
+  // Returns the scores of the candidates with pseudo labels that work.judgements keeps, in their order.
+  // work.decoded must hold their patches, which are mirrored and predicted in batches inside the unit, and
+  // their masks.
+  std::vector<MeasuredLabel> measure(const UnitWork& work, const NetworkSource& network) const;
 
  private:
-  filters::LabelMeasures measure_one(const device::CropKeypoints& keypoints,
-                                     const device::BodyPrediction& body, const device::BodyMesh* mesh,
-                                     const DecodedSample* decoded) const;
+  struct Label;
+  static std::vector<Label> kept_labels(const UnitWork& work);
+  manifests::TrustScores measure_one(const UnitWork& work, const Label& label,
+                                     const device::BodyMesh& mesh) const;
 
-  config::GuardConfig guards_;
-  std::optional<filters::PosePrior> pose_prior_;
+  std::vector<int> mirror_;  // of the 26 keypoints: the index of each one's mirror image
+  std::optional<device::PriorNumbers> priors_;
   std::optional<filters::LimbRange> limb_range_;
-  std::unique_ptr<device::BodyMeshes> meshes_;  // null when no bound needs a body
+  std::unique_ptr<device::BodyMeshes> meshes_;
   std::vector<std::array<std::int32_t, 3>> faces_;
 };
+
+// Returns the patch (256 x 256 x 3, row-major) with left and right exchanged.
+std::vector<std::uint8_t> mirrored_patch(device::PatchView patch);
 
 }  // namespace q3d::pipeline::unit

@@ -13,7 +13,8 @@ using filters::Band;
 using manifests::Reason;
 
 // What a candidate needs at each point of its way, as far as its facts ask for it: patches are for pseudo
-// labels, stored crops for what goes to a shard, masks for what is measured against them.
+// labels, stored crops for what goes to a shard, masks for what is measured against them. A patch is needed
+// once more when a label is measured, because its mirror image is predicted.
 struct Needs {
   Standing standing;
   bool decoding;  // even if no part is needed
@@ -49,9 +50,10 @@ Standing standing_of(const UnitWork& work, std::size_t i, const config::JudgingR
 
 std::optional<Wanted> wanted(const PictureFacts& facts) {
   const Needs& needs = kNeeds.at(static_cast<std::size_t>(facts.standing));
-  const Wanted want{.patch = needs.patch && facts.is_pseudo,
+  const bool measures = facts.standing == Standing::may_be_kept && facts.measures_label;
+  const Wanted want{.patch = (needs.patch || measures) && facts.is_pseudo,
                     .stored_crop = needs.stored_crop && facts.lacks_crop,
-                    .patch_mask = needs.patch_mask && facts.measures_mask};
+                    .patch_mask = needs.patch_mask && facts.measures_label && facts.has_mask};
   const bool needs_part = want.patch || want.stored_crop || want.patch_mask;
   return needs.decoding || needs_part ? std::optional(want) : std::nullopt;
 }
@@ -64,8 +66,8 @@ PictureFacts picture_facts(const UnitWork& work, std::size_t i, const config::Ju
   if (rules == nullptr) return facts;
   facts.lacks_crop =
       !work.shard_before && candidate.exclusion.reason == Reason::none && find_crop(work, i) == nullptr;
-  facts.measures_mask = facts.is_pseudo && rules->guards.mask_iou_min > 0.0 && !work.measured &&
-                        !candidate.record.mask_path.empty();
+  facts.measures_label = facts.is_pseudo && !work.measured;
+  facts.has_mask = !candidate.record.mask_path.empty();
   return facts;
 }
 

@@ -21,10 +21,11 @@ enum class Standing : std::uint8_t {
 // What decides which parts of a picture are needed.
 struct PictureFacts {
   Standing standing = Standing::finished;
-  bool is_pseudo = false;      // its label comes from the network
-  bool lacks_crop = false;     // the unit's shard is still to be made, the candidate may be in it, and its
-                               // stored crop has not been encoded by any build
-  bool measures_mask = false;  // its label is still to be measured against its mask
+  bool is_pseudo = false;       // its label comes from the network
+  bool lacks_crop = false;      // the unit's shard is still to be made, the candidate may be in it, and its
+                                // stored crop has not been encoded by any build
+  bool measures_label = false;  // its label, if it is kept, is still to be measured
+  bool has_mask = false;        // its annotation names a mask
 };
 
 // Parts of a picture.

@@ -54,6 +54,8 @@ void visit_body(Visitor&& visit) {
         &device::BodyPrediction::keypoints_2d);
   visit("aux_keypoints_2d", std::vector<std::int64_t>{manifests::kNumKeypoints, 2},
         &device::BodyPrediction::aux_keypoints_2d);
+  visit("aux_keypoints_3d", std::vector<std::int64_t>{manifests::kNumKeypoints, 3},
+        &device::BodyPrediction::aux_keypoints_3d);
 }
 
 template <typename Row>
@@ -93,12 +95,10 @@ void read_curves(const Table& table, const std::string& name, std::vector<Refine
   }
 }
 
-constexpr std::array<std::pair<const char*, double filters::LabelMeasures::*>, 4> kMeasureColumns{{
-    {"pose_deviation", &filters::LabelMeasures::pose_deviation},
-    {"limb_factor", &filters::LabelMeasures::limb_factor},
-    {"left_right", &filters::LabelMeasures::left_right},
-    {"mask_iou", &filters::LabelMeasures::mask_iou},
-}};
+// Those that are measured; the combined score is computed from them when a unit is judged.
+std::span<const manifests::TrustColumn> measured_columns() {
+  return std::span(manifests::kTrustColumns).subspan(1);
+}
 
 const std::vector<std::string>& text_column(const Table& table, const std::string& name) {
   const auto found = table.text.find(name);
@@ -229,17 +229,12 @@ Table to_table(const std::vector<MeasuredLabel>& labels) {
   Table table;
   table.rows = static_cast<std::int64_t>(labels.size());
   std::vector<std::int64_t> positions;
-  std::vector<std::int32_t> visible;
-  for (const MeasuredLabel& label : labels) {
-    positions.push_back(static_cast<std::int64_t>(label.sample));
-    visible.push_back(label.measures.visible);
-  }
+  for (const MeasuredLabel& label : labels) positions.push_back(static_cast<std::int64_t>(label.sample));
   table.add<std::int64_t>("sample", {}, positions);
-  table.add<std::int32_t>("visible", {}, visible);
-  for (const auto& [name, field] : kMeasureColumns) {
+  for (const manifests::TrustColumn& column : measured_columns()) {
     std::vector<double> values;
-    for (const MeasuredLabel& label : labels) values.push_back(label.measures.*field);
-    table.add<double>(name, {}, values);
+    for (const MeasuredLabel& label : labels) values.push_back(label.scores.*column.score);
+    table.add<double>(column.name, {}, values);
   }
   return table;
 }
@@ -247,14 +242,10 @@ Table to_table(const std::vector<MeasuredLabel>& labels) {
 std::vector<MeasuredLabel> measured_from_table(const Table& table) {
   std::vector<MeasuredLabel> labels(static_cast<std::size_t>(table.rows));
   const auto positions = table.column<std::int64_t>("sample");
-  const auto visible = table.column<std::int32_t>("visible");
-  for (std::size_t i = 0; i < labels.size(); ++i) {
-    labels[i].sample = static_cast<std::size_t>(positions[i]);
-    labels[i].measures.visible = visible[i];
-  }
-  for (const auto& [name, field] : kMeasureColumns) {
-    const auto values = table.column<double>(name);
-    for (std::size_t i = 0; i < labels.size(); ++i) labels[i].measures.*field = values[i];
+  for (std::size_t i = 0; i < labels.size(); ++i) labels[i].sample = static_cast<std::size_t>(positions[i]);
+  for (const manifests::TrustColumn& column : measured_columns()) {
+    const auto values = table.column<double>(column.name);
+    for (std::size_t i = 0; i < labels.size(); ++i) labels[i].scores.*column.score = values[i];
   }
   return labels;
 }

@@ -35,10 +35,10 @@ struct RefinedSample {
   std::vector<double> held_out_curve;  // the held-out keypoints' error of the same iterates; empty without
 };
 
-// What the guards look at, of one candidate that the fidelity rule keeps.
+// What was measured of one candidate that the fidelity rule keeps: all trust scores but the combined one.
 struct MeasuredLabel {
   std::size_t sample = 0;  // position within the unit
-  filters::LabelMeasures measures;
+  manifests::TrustScores scores;
 };
 
 // The stored crop of a candidate, as its shard holds it.
@@ -71,7 +71,7 @@ struct UnitWork {
   // Filled from the journal where an earlier run had finished the stage, else by the stage's node.
   std::optional<std::vector<PredictedSample>> predicted;
   std::optional<std::vector<RefinedSample>> refined;
-  std::optional<std::vector<MeasuredLabel>> measured;  // nothing as long as no guard needs it
+  std::optional<std::vector<MeasuredLabel>> measured;
   bool predicted_before = false;
   bool refined_before = false;
   bool measured_before = false;

@@ -169,5 +169,54 @@ TEST(MaskIou, CountsPixelsOfHalfAndMore) {
   EXPECT_THROW(mask_iou(one, std::vector<std::uint8_t>(4)), std::invalid_argument);
 }
 
+// Two families in 41 dimensions: of unit variance around 0, and of half the deviation around 10 in beta 0.
+ShapePrior two_families() {
+  constexpr std::size_t kBetas = 41;
+  ShapePrior prior;
+  for (const double scale : {1.0, 2.0}) {
+    ShapePrior::Family& family = prior.families.emplace_back();
+    family.mean.assign(kBetas, 0.0);
+    family.precs.assign(kBetas * kBetas, 0.0);
+    for (std::size_t i = 0; i < kBetas; ++i) family.precs[i * kBetas + i] = scale;
+  }
+  prior.families[1].mean[0] = 10.0;
+  return prior;
+}
+
+TEST(ShapeDeviation, IsTheWhitenedRootMeanSquare) {
+  std::vector<float> betas(41, 0.0F);
+  betas[0] = 8.0F;
+  EXPECT_DOUBLE_EQ(shape_deviation(betas, 0, two_families()), 8.0 / std::sqrt(41.0));
+  EXPECT_DOUBLE_EQ(shape_deviation(betas, 1, two_families()), 4.0 / std::sqrt(41.0));
+  EXPECT_DOUBLE_EQ(shape_deviation(betas, -1, two_families()), 4.0 / std::sqrt(41.0)) << "the nearest";
+  // precs acts from the right: deviation @ precs.
+  ShapePrior skewed = two_families();
+  skewed.families[0].precs[0 * 41 + 1] = 3.0;
+  EXPECT_DOUBLE_EQ(shape_deviation(betas, 0, skewed), std::sqrt((8.0 * 8.0 + 24.0 * 24.0) / 41.0));
+  EXPECT_THROW(shape_deviation(betas, 2, two_families()), std::invalid_argument);
+  EXPECT_THROW(shape_deviation(std::vector<float>(40), 0, two_families()), std::invalid_argument);
+  EXPECT_THROW(shape_deviation(betas, -1, {}), std::invalid_argument);
+}
+
+TEST(MirroredKeypoints, ChangeSideAndPlace) {
+  std::vector<float> keypoints(26 * 3);
+  for (std::size_t i = 0; i < keypoints.size(); ++i) keypoints[i] = static_cast<float>(i);
+  std::vector<int> mirror(26);
+  for (int k = 0; k < 26; ++k) mirror[static_cast<std::size_t>(k)] = k;
+  mirror[0] = 1;
+  mirror[1] = 0;
+  const std::vector<float> mirrored = mirrored_keypoints(keypoints, mirror);
+  EXPECT_EQ(std::vector(mirrored.begin(), mirrored.begin() + 9),
+            (std::vector<float>{-3, 4, 5, 0, 1, 2, -6, 7, 8}));
+  EXPECT_EQ(mirrored_keypoints(mirrored, mirror), keypoints) << "twice is nothing";
+  EXPECT_THROW(mirrored_keypoints(std::vector<float>(77), mirror), std::invalid_argument);
+}
+
+TEST(MeanAbsoluteDifference, IsOverAllNumbers) {
+  EXPECT_EQ(mean_absolute_difference(std::vector<float>{1, 2, -3}, std::vector<float>{1, 0, 1}), 2.0);
+  EXPECT_THROW(mean_absolute_difference({}, {}), std::invalid_argument);
+  EXPECT_THROW(mean_absolute_difference(std::vector<float>{1}, {}), std::invalid_argument);
+}
+
 }  // namespace
 }  // namespace q3d::filters

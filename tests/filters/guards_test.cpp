@@ -32,13 +32,13 @@ Judgement kept(Verdict verdict = Verdict::refined) {
 }
 
 // A label that every bound of all_on() lets through.
-LabelMeasures good() {
-  LabelMeasures measures;
+manifests::TrustScores good() {
+  manifests::TrustScores measures;
   measures.visible = 8;
-  measures.pose_deviation = 2.0;
-  measures.limb_factor = 1.5;
-  measures.left_right = 1.0;
-  measures.mask_iou = 0.5;
+  measures.pose_prior = 2.0;
+  measures.limbs = 1.5;
+  measures.sides = 1.0;
+  measures.mask = 0.5;
   return measures;
 }
 
@@ -63,7 +63,7 @@ TEST(Guards, WhatLiesOnABoundIsKeptAsItWas) {
 
 TEST(Guards, EachHasItsReason) {
   const auto reason_of = [](auto change) {
-    LabelMeasures measures = good();
+    manifests::TrustScores measures = good();
     change(measures);
     const Judgement judgement = apply_bounds(kept(), measures, all_on());
     EXPECT_EQ(judgement.verdict, Verdict::discarded);
@@ -71,18 +71,17 @@ TEST(Guards, EachHasItsReason) {
     return judgement.reason;
   };
   EXPECT_EQ(reason_of([](auto& m) { m.visible = 7; }), Reason::too_few_keypoints);
-  EXPECT_EQ(reason_of([](auto& m) { m.pose_deviation = std::nextafter(2.0, 3.0); }),
-            Reason::pose_implausible);
-  EXPECT_EQ(reason_of([](auto& m) { m.limb_factor = kInfinity; }), Reason::limbs_implausible);
-  EXPECT_EQ(reason_of([](auto& m) { m.left_right = 1.01; }), Reason::left_right_swapped);
-  EXPECT_EQ(reason_of([](auto& m) { m.mask_iou = std::nextafter(0.5, 0.0); }), Reason::mask_mismatch);
+  EXPECT_EQ(reason_of([](auto& m) { m.pose_prior = std::nextafter(2.0, 3.0); }), Reason::pose_implausible);
+  EXPECT_EQ(reason_of([](auto& m) { m.limbs = kInfinity; }), Reason::limbs_implausible);
+  EXPECT_EQ(reason_of([](auto& m) { m.sides = 1.01; }), Reason::left_right_swapped);
+  EXPECT_EQ(reason_of([](auto& m) { m.mask = std::nextafter(0.5, 0.0); }), Reason::mask_mismatch);
 }
 
 TEST(Guards, AreOffByDefault) {
-  LabelMeasures hopeless;
+  manifests::TrustScores hopeless;
   hopeless.visible = 0;
-  hopeless.pose_deviation = hopeless.limb_factor = hopeless.left_right = 1e9;
-  hopeless.mask_iou = 0.0;
+  hopeless.pose_prior = hopeless.limbs = hopeless.sides = 1e9;
+  hopeless.mask = 0.0;
   EXPECT_EQ(apply_bounds(kept(), hopeless, {}).verdict, Verdict::refined);
   EXPECT_FALSE(is_any_on({}));
   EXPECT_TRUE(is_any_on(all_on()));
@@ -92,16 +91,16 @@ TEST(Guards, AreOffByDefault) {
 }
 
 TEST(Guards, WhatCannotBeMeasuredHasNoSay) {
-  LabelMeasures unknown;
+  manifests::TrustScores unknown;
   unknown.visible = 8;
-  EXPECT_TRUE(std::isnan(unknown.mask_iou));
+  EXPECT_TRUE(std::isnan(unknown.mask));
   EXPECT_EQ(apply_bounds(kept(), unknown, all_on()).verdict, Verdict::refined);
 }
 
 TEST(Guards, TheFirstBrokenBoundGivesTheReasonAndAllAreNamed) {
-  LabelMeasures measures = good();
-  measures.pose_deviation = 3.0;
-  measures.mask_iou = 0.125;
+  manifests::TrustScores measures = good();
+  measures.pose_prior = 3.0;
+  measures.mask = 0.125;
   const Judgement judgement = apply_bounds(kept(), measures, all_on());
   EXPECT_EQ(judgement.reason, Reason::pose_implausible);
   EXPECT_EQ(judgement.detail, "pose_deviation 3, pose_deviation_max 2; mask_iou 0.125, mask_iou_min 0.5");
@@ -111,7 +110,7 @@ TEST(Guards, LeaveOtherVerdictsAlone) {
   Judgement judgement = kept();
   judgement.verdict = Verdict::discarded;
   judgement.reason = Reason::error_too_large;
-  LabelMeasures measures = good();
+  manifests::TrustScores measures = good();
   measures.visible = 0;
   const Judgement after = apply_bounds(judgement, measures, all_on());
   EXPECT_EQ(after.reason, Reason::error_too_large);

@@ -159,7 +159,7 @@ TEST(StageKeys, AGuardThatChangesAdaptationRedoesRefinement) {
     EXPECT_EQ(before.fidelity, after.fidelity);
     EXPECT_NE(before.refine, after.refine);
     EXPECT_NE(before.shards, after.shards);
-    EXPECT_EQ(after.measure, "");
+    EXPECT_NE(before.measure, after.measure) << "other labels are measured";
   }
   Inputs seed;  // of nothing
   seed.guard([](config::GuardConfig& g) { g.held_out_seed = 5; });
@@ -168,12 +168,12 @@ TEST(StageKeys, AGuardThatChangesAdaptationRedoesRefinement) {
 
 TEST(StageKeys, AChangedBoundKeepsRefinementsAndMeasures) {
   const StageKeys none = Inputs().keys();
-  EXPECT_EQ(none.measure, "");
+  EXPECT_NE(none.measure, "") << "trust scores are always measured";
   Inputs inputs;
   inputs.guard([](config::GuardConfig& g) { g.mask_iou_min = 0.5; });
   const StageKeys before = inputs.keys();
   EXPECT_EQ(none.refine, before.refine);
-  EXPECT_NE(before.measure, "");
+  EXPECT_EQ(none.measure, before.measure);
   EXPECT_NE(none.shards, before.shards);
   inputs.guard([](config::GuardConfig& g) { g.mask_iou_min = 0.6; });
   const StageKeys after = inputs.keys();
@@ -181,8 +181,10 @@ TEST(StageKeys, AChangedBoundKeepsRefinementsAndMeasures) {
   EXPECT_EQ(before.refine, after.refine);
   EXPECT_EQ(before.measure, after.measure);
   EXPECT_NE(before.shards, after.shards);
-  inputs.guard([](config::GuardConfig& g) { g.limb_factor_max = 2.0; });
-  EXPECT_NE(after.measure, inputs.keys().measure) << "more is measured";
+  Inputs trusted;
+  trusted.rules.min_trust = 0.5;
+  EXPECT_EQ(none.measure, trusted.keys().measure);
+  EXPECT_NE(none.shards, trusted.keys().shards);
   const StageKeys by_one = inputs.keys();
   inputs.assets.priors = "other priors";
   EXPECT_NE(by_one.measure, inputs.keys().measure);

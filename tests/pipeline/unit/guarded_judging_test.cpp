@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include <stdexcept>
 
@@ -84,7 +85,7 @@ TEST(GuardedJudging, BoundsActOnRetainedAndRefinedLabels) {
   for (const std::size_t sample : {0, 1, 2}) {
     MeasuredLabel& label = unit.work.measured->emplace_back();
     label.sample = sample;
-    label.measures.visible = sample == 2 ? 9 : 6;
+    label.scores.visible = sample == 2 ? 9 : 6;
   }
   EXPECT_EQ(unit.judge(0).reason, Reason::too_few_keypoints);
   EXPECT_EQ(unit.judge(1).reason, Reason::too_few_keypoints);
@@ -142,6 +143,30 @@ TEST(GuardedJudging, OneKeypointCannotBeHeldOut) {
   EXPECT_EQ(unit.judge().verdict, Verdict::discarded);
   EXPECT_EQ(unit.judge().reason, Reason::held_out_not_better);
   EXPECT_EQ(unit.judge().initial_error, 0.25);
+}
+
+TEST(GuardedJudging, LabelsThatAreTrustedTooLittleAreDiscarded) {
+  GivenUnit unit;
+  unit.add(10, 0.1F);
+  EXPECT_TRUE(std::isnan(unit.judge().trust.combined)) << "not measured yet";
+  unit.rules.min_trust = 0.5;
+  EXPECT_EQ(unit.judge().verdict, Verdict::retained) << "nothing is known against it";
+  MeasuredLabel& label = unit.work.measured.emplace().emplace_back();
+  label.scores.visible = 10;
+  label.scores.mirror = 1.0;
+  label.scores.aux_2d = 0.001;
+  EXPECT_EQ(unit.judge().verdict, Verdict::retained);
+  const double good = unit.judge().trust.combined;
+  EXPECT_GT(good, 0.5);
+  EXPECT_LE(good, 1.0);
+  label.scores.mirror = 1000.0;
+  label.scores.aux_2d = 0.5;
+  EXPECT_EQ(unit.judge().verdict, Verdict::discarded);
+  EXPECT_EQ(unit.judge().reason, Reason::trust_too_low);
+  EXPECT_LT(unit.judge().trust.combined, 0.5);
+  EXPECT_EQ(unit.judge().trust.mirror, 1000.0) << "the scores stay";
+  unit.rules.min_trust = 0.0;
+  EXPECT_EQ(unit.judge().verdict, Verdict::retained) << "off";
 }
 
 TEST(GuardedJudging, RetainedPredictionsAreAdaptedOnRequest) {

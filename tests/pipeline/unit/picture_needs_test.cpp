@@ -23,7 +23,7 @@ std::string parts(const PictureFacts& facts) {
 TEST(PictureNeeds, FollowTheTable) {
   struct Case {
     Standing standing;
-    bool is_pseudo, lacks_crop, measures_mask;
+    bool is_pseudo, lacks_crop, measures_label, has_mask;
     const char* expected;
   };
   const auto unpredicted = Standing::unpredicted;
@@ -31,19 +31,21 @@ TEST(PictureNeeds, FollowTheTable) {
   const auto may_be_kept = Standing::may_be_kept;
   const auto finished = Standing::finished;
   const std::vector<Case> cases{
-      {unpredicted, false, false, false, "-"}, {unpredicted, false, true, false, "c"},
-      {unpredicted, true, false, false, "p"},  {unpredicted, true, true, false, "pc"},
-      {unpredicted, true, false, true, "pm"},  {unpredicted, true, true, true, "pcm"},
-      {to_adapt, true, false, false, "p"},     {to_adapt, true, true, false, "pc"},
-      {to_adapt, true, false, true, "pm"},     {to_adapt, true, true, true, "pcm"},
-      {may_be_kept, false, false, false, ""},  {may_be_kept, false, true, false, "c"},
-      {may_be_kept, true, false, false, ""},   {may_be_kept, true, true, false, "c"},
-      {may_be_kept, true, false, true, "m"},   {may_be_kept, true, true, true, "cm"},
-      {finished, false, false, false, ""},     {finished, false, true, false, ""},
-      {finished, true, false, false, ""},      {finished, true, true, true, ""},
+      {unpredicted, false, false, false, true, "-"}, {unpredicted, false, true, false, true, "c"},
+      {unpredicted, true, false, true, false, "p"},  {unpredicted, true, true, true, false, "pc"},
+      {unpredicted, true, false, true, true, "pm"},  {unpredicted, true, true, true, true, "pcm"},
+      {to_adapt, true, false, true, false, "p"},     {to_adapt, true, true, true, false, "pc"},
+      {to_adapt, true, false, true, true, "pm"},     {to_adapt, true, true, true, true, "pcm"},
+      {may_be_kept, false, false, false, true, ""},  {may_be_kept, false, true, false, true, "c"},
+      {may_be_kept, true, false, false, true, ""},   {may_be_kept, true, true, false, true, "c"},
+      {may_be_kept, true, false, true, false, "p"},  {may_be_kept, true, true, true, false, "pc"},
+      {may_be_kept, true, false, true, true, "pm"},  {may_be_kept, true, true, true, true, "pcm"},
+      {finished, false, false, false, true, ""},     {finished, false, true, false, true, ""},
+      {finished, true, false, true, true, ""},       {finished, true, true, true, true, ""},
   };
   for (const Case& each : cases) {
-    EXPECT_EQ(parts({each.standing, each.is_pseudo, each.lacks_crop, each.measures_mask}), each.expected)
+    EXPECT_EQ(parts({each.standing, each.is_pseudo, each.lacks_crop, each.measures_label, each.has_mask}),
+              each.expected)
         << "case " << (&each - cases.data());
   }
 }
@@ -149,19 +151,17 @@ TEST(PictureNeeds, AStoredCropIsEncodedOnceAndForAShardThatIsStillToBeMade) {
   EXPECT_FALSE(one.facts().lacks_crop);
 }
 
-TEST(PictureNeeds, AMaskIsForPseudoLabelsThatAreMeasuredAgainstIt) {
+TEST(PictureNeeds, PseudoLabelsAreMeasuredOnce) {
   OneCandidate one;
-  EXPECT_FALSE(one.facts().measures_mask) << "the guard is off";
-  one.rules.guards.mask_iou_min = 0.5;
-  EXPECT_TRUE(one.facts().measures_mask);
+  EXPECT_TRUE(one.facts().measures_label);
+  EXPECT_TRUE(one.facts().has_mask);
   one.work.measured.emplace();
-  EXPECT_FALSE(one.facts().measures_mask);
+  EXPECT_FALSE(one.facts().measures_label);
   one.work.measured.reset();
   one.candidates[0].record.mask_path.clear();
-  EXPECT_FALSE(one.facts().measures_mask);
-  one.candidates[0].record.mask_path = "/mask.png";
+  EXPECT_FALSE(one.facts().has_mask);
   one.candidates[0].role = config::Role::truth;
-  EXPECT_FALSE(one.facts().measures_mask);
+  EXPECT_FALSE(one.facts().measures_label);
 }
 
 }  // namespace

@@ -98,22 +98,24 @@ TEST(UnitTables, MeasuresSurviveTheDisk) {
   const testing::ScratchDir scratch;
   std::vector<MeasuredLabel> labels(2);
   labels[0].sample = 3;
-  labels[0].measures = {17, 1.25, 0.75, 0.5, 0.875};
+  double number = 1.0;
+  for (const manifests::TrustColumn& column : manifests::kTrustColumns)
+    labels[0].scores.*column.score = number *= 1.5;
   labels[1].sample = 8;
-  labels[1].measures.visible = 5;  // nothing else could be measured
+  labels[1].scores.visible = 5;  // nothing else could be measured
   manifests::write_table(scratch.path() / "t.h5", to_table(labels));
   const auto back = measured_from_table(manifests::read_table(scratch.path() / "t.h5"));
   ASSERT_EQ(back.size(), 2U);
   EXPECT_EQ(back[0].sample, 3U);
-  EXPECT_EQ(back[0].measures.visible, 17);
-  EXPECT_EQ(back[0].measures.pose_deviation, 1.25);
-  EXPECT_EQ(back[0].measures.limb_factor, 0.75);
-  EXPECT_EQ(back[0].measures.left_right, 0.5);
-  EXPECT_EQ(back[0].measures.mask_iou, 0.875);
+  EXPECT_TRUE(std::isnan(back[0].scores.combined)) << "it is computed anew";
+  number = 1.5;
+  for (const manifests::TrustColumn& column : std::span(manifests::kTrustColumns).subspan(1)) {
+    EXPECT_EQ(back[0].scores.*column.score, number *= 1.5) << column.name;
+  }
   EXPECT_EQ(back[1].sample, 8U);
-  EXPECT_EQ(back[1].measures.visible, 5);
-  EXPECT_TRUE(std::isnan(back[1].measures.pose_deviation));
-  EXPECT_TRUE(std::isnan(back[1].measures.mask_iou));
+  EXPECT_EQ(back[1].scores.visible, 5);
+  EXPECT_TRUE(std::isnan(back[1].scores.pose_prior));
+  EXPECT_TRUE(std::isnan(back[1].scores.mask));
   manifests::write_table(scratch.path() / "empty.h5", to_table(std::vector<MeasuredLabel>()));
   EXPECT_TRUE(measured_from_table(manifests::read_table(scratch.path() / "empty.h5")).empty());
 }

@@ -56,6 +56,7 @@ class Scene:
             "network": {"checkpoint": str(self.network), "smal_asset": str(self.body), "device": "cpu", "batch": 4,
                         "compute_threads": 1},
             "tta": {"learning_rate": 1e-3, "batch": 4},
+            "filter": {"tau_ceiling": 1.0},  # the network is untrained, and the pictures are noise
             "shards": {"unit_size": UNIT},
         }
         for key, value in changes.items():

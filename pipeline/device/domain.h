@@ -1,0 +1,50 @@
+// What a checkpoint says of the pictures that its network knows. It stands in the file's metadata under
+// kDomainKey: `train` measures and writes it, tools/import_assets.py writes what the paper states.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace q3d::pipeline::device {
+
+inline constexpr const char* kDomainKey = "prima_domain";  // in the metadata of a checkpoint
+// The name that the body model of the rendered world has in its asset file.
+inline constexpr const char* kSyntheticBodyName = "synthetic quadruped";
+
+enum class Pictures : std::uint8_t { unknown, photographs, rendered };
+
+struct ErrorQuantile {
+  double share = 0.0;   // of the held-out pictures, between 0 and 1
+  double l_proj = 0.0;  // crop units: this share of the pictures has at most this L_proj
+};
+
+struct NetworkDomain {
+  Pictures pictures = Pictures::unknown;
+  std::string trained_on;  // for people
+  // L_proj of predictions for pictures of the same kind that training has not seen. Ascending in share; empty
+  // if nobody has measured it.
+  std::string held_out;  // for people: which pictures
+  std::int64_t held_out_pictures = 0;
+  std::vector<ErrorQuantile> quantiles;
+};
+
+// The domain as JSON text:
+//   {"pictures": "rendered", "trained_on": "...",
+//    "held_out": {"pictures": 500, "what": "...", "l_proj": {"0.05": 0.02, "0.5": 0.04, "0.95": 0.12}}}
+std::string to_json(const NetworkDomain& domain);
+// Throws std::runtime_error that says what was found and expected for a text that is not of this form.
+NetworkDomain domain_from_json(const std::string& text);
+
+// The quantile of exactly this share, if it was measured.
+std::optional<double> quantile(const NetworkDomain& domain, double share);
+
+// The shares that `train` measures: 0.05, 0.25, 0.5, 0.75, 0.95.
+const std::vector<double>& measured_shares();
+
+// Measures quantiles of some errors, linearly interpolated, as numpy does. Throws std::invalid_argument
+// without errors and for errors that are not finite.
+std::vector<ErrorQuantile> quantiles_of(std::vector<double> errors, const std::vector<double>& shares);
+
+}  // namespace q3d::pipeline::device
