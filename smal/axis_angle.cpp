@@ -25,4 +25,17 @@ Pose rotation_matrices(const AxisAnglePose& axis_angle) {
   return matrices;
 }
 
+std::array<double, kNumJoints * 3> axis_angles(const std::array<float, kNumJoints * 9>& matrices) {
+  std::array<double, kNumJoints * 3> vectors{};
+  for (std::size_t joint = 0; joint < kNumJoints; ++joint) {
+    const Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>> matrix(&matrices[9 * joint]);
+    Eigen::Quaterniond quaternion(Eigen::Matrix3d(matrix.cast<double>()));
+    quaternion.normalize();  // float32 matrices are rotations up to rounding
+    const Eigen::AngleAxisd turn(quaternion);
+    const Eigen::Vector3d vector = turn.angle() * turn.axis();
+    std::copy_n(vector.data(), 3, &vectors[3 * joint]);
+  }
+  return vectors;
+}
+
 }  // namespace q3d::smal

@@ -9,4 +9,8 @@ namespace q3d::smal {
 // Official evaluator: pytorch3d's axis_angle_to_matrix.
 Pose rotation_matrices(const AxisAnglePose& axis_angle);
 
+// The inverse: 35 row-major rotation matrices to 35 axis-angle vectors (rad), computed in double by unit
+// quaternions. The angles lie in [0, pi].
+std::array<double, kNumJoints * 3> axis_angles(const std::array<float, kNumJoints * 9>& matrices);
+
 }  // namespace q3d::smal

@@ -49,6 +49,13 @@ std::string without_root(std::string text, const std::filesystem::path& root) {
   return text;
 }
 
+std::string note_of(const Corrections& corrections, const std::filesystem::path& file) {
+  return fmt::format("corrections {}: the keypoints of {} candidates are replaced; {} of its ids are no "
+                     "candidate's",
+                     file.filename().string(), corrections.matched,
+                     corrections.points.size() - corrections.matched);
+}
+
 // A label must have what its role promises.
 void check_role(config::Role role, manifests::SampleRecord& record) {
   if (role != config::Role::truth || record.failure != Reason::none) return;
@@ -165,11 +172,13 @@ IngestedDataset read_dataset(const config::DatasetConfig& options, manifests::Di
 Ingest ingest(const config::BuildConfig& config, manifests::DigestCache& digests,
               const device::BodyMeshesLoader& load_bodies) {
   Ingest result;
+  if (!config.corrections.empty()) result.corrections = read_corrections(config.corrections);
   for (const auto& options : config.datasets) {
     auto [dataset, digest] = read_dataset(options, digests);
     const std::string name = options.name + "/" + options.split;
     result.annotation_digests[name] = std::move(digest);
     if (is_rendered(options.root)) result.rendered.insert(name);
+    if (result.corrections) apply_corrections(*result.corrections, dataset.records);
     for (auto& record : dataset.records) check_role(options.role, record);
     std::vector<std::string> findings = check_truth(options, load_bodies, dataset);
     for (std::size_t i = 0; i < dataset.records.size(); ++i) {
@@ -177,6 +186,10 @@ Ingest ingest(const config::BuildConfig& config, manifests::DigestCache& digests
           {std::move(dataset.records[i]), {}, {}, options.role, std::move(findings[i])});
     }
     for (auto& note : dataset.notes) result.notes.push_back({note.kind, name, std::move(note.text)});
+  }
+  if (result.corrections) {
+    result.notes.push_back(
+        {loaders::formats::NoteKind::remark, {}, note_of(*result.corrections, config.corrections)});
   }
   require_unique_ids(result.candidates);
   digest_pictures(result.candidates, digests);

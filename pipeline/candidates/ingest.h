@@ -12,6 +12,7 @@
 #include "loaders/formats/note.h"
 #include "manifests/digest.h"
 #include "manifests/sample.h"
+#include "pipeline/candidates/corrections.h"
 #include "pipeline/candidates/veto.h"
 #include "pipeline/config/build_config.h"
 #include "pipeline/device/body_meshes.h"
@@ -68,6 +69,7 @@ struct Ingest {
   std::map<std::string, std::string> annotation_digests;  // "name/split" -> SHA-256 of its annotation files
   std::set<std::string> rendered;  // "name/split" of those whose pictures `sample` rendered
   std::vector<IngestNote> notes;
+  std::optional<Corrections> corrections;  // their points are in the records
 
   // Set by leave_out (pipeline/leakage/exclusions.h).
   std::optional<Veto> veto;

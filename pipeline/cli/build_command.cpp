@@ -20,6 +20,7 @@ namespace {
 struct Arguments {
   ConfigArguments config;
   std::filesystem::path veto;
+  std::filesystem::path corrections;
   run::RunOptions run;
   bool json = false;
 };
@@ -91,12 +92,17 @@ nlohmann::ordered_json to_json(const build::BuildSummary& summary) {
           {"seconds", summary.seconds}};
 }
 
-// --veto replaces the config's key `veto`.
+// --veto and --corrections replace the config's keys of these names.
 config::BuildConfig configured(const Arguments& arguments) {
   config::BuildConfig config = config::load_build_config(arguments.config.files, arguments.config.settings());
-  if (arguments.veto.empty()) return config;
-  config.veto = std::filesystem::absolute(arguments.veto);
-  config.as_written["veto"] = arguments.veto.string();
+  const auto replace = [&](const char* key, const std::filesystem::path& file,
+                           std::filesystem::path& target) {
+    if (file.empty()) return;
+    target = std::filesystem::absolute(file);
+    config.as_written[key] = file.string();
+  };
+  replace("veto", arguments.veto, config.veto);
+  replace("corrections", arguments.corrections, config.corrections);
   return config;
 }
 
@@ -112,6 +118,10 @@ Command add_build(CLI::App& app) {
   command
       ->add_option("--veto", arguments->veto,
                    "file with the ids of samples to leave out, one per line; a reason may follow after a tab")
+      ->check(CLI::ExistingFile);
+  command
+      ->add_option("--corrections", arguments->corrections,
+                   "file of corrected keypoints, as `quadruped3d corrections` writes it")
       ->check(CLI::ExistingFile);
   threads_option(*command, arguments->run.threads);
   above_ceiling_flag(*command, arguments->run.above_ceiling);

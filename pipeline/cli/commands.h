@@ -18,7 +18,7 @@ struct CommandInfo {
   bool needs_network;                 // links LibTorch, and is therefore in the program quadruped3d-network
   std::string_view network_option{};  // with this option, the command runs there too
 };
-inline constexpr std::array<CommandInfo, 19> kCommands{{
+inline constexpr std::array<CommandInfo, 21> kCommands{{
     {"build", "make a versioned dataset of labels from annotated photographs", true},
     {"calibrate", "find the thresholds that give the wanted shares of labels", true},
     {"predict", "give the bodies of animals in photographs, with or without keypoints", true},
@@ -38,6 +38,8 @@ inline constexpr std::array<CommandInfo, 19> kCommands{{
     {"explain", "show all that is known of one candidate, and why it got its verdict", false},
     {"leakage", "find pictures of the pool that are also in a test set, or twice in the pool", false},
     {"topology", "write a topology file for a lab's labels, and show which points are left and right", false},
+    {"export", "write a dataset in another project's format: PRIMA, COCO, Parquet, Hugging Face", false},
+    {"corrections", "take corrected keypoints and vetoes back from an exported COCO file", false},
     {"curate", "choose a balanced subset of a large dataset, by species; build takes the list", false},
 }};
 
@@ -69,5 +71,7 @@ Command add_compare_labels(CLI::App& app);
 Command add_config(CLI::App& app);
 Command add_curate(CLI::App& app);
 Command add_topology(CLI::App& app);
+Command add_export(CLI::App& app);
+Command add_corrections(CLI::App& app);
 
 }  // namespace q3d::pipeline::cli

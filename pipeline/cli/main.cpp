@@ -16,7 +16,7 @@ int main(int argc, char** argv) {
   if (words.size() > command && cli::needs_network(words.subspan(command))) {
     return cli::become_network_program(argv);
   }
-  constexpr std::array<cli::CommandEntry, 7> kEntries{{
+  constexpr std::array<cli::CommandEntry, 9> kEntries{{
       {"verify", cli::add_verify},
       {"inspect", cli::add_inspect},
       {"config", cli::add_config},
@@ -24,6 +24,8 @@ int main(int argc, char** argv) {
       {"leakage", cli::add_leakage},
       {"curate", cli::add_curate},
       {"topology", cli::add_topology},
+      {"export", cli::add_export},
+      {"corrections", cli::add_corrections},
   }};
   return cli::run_program(argc, argv, kEntries);
 }

@@ -182,6 +182,7 @@ void resolve_paths(json& config, const fs::path& folder) {
   }
   if (config.contains("guards")) resolve_path(config["guards"], "priors", folder);
   resolve_path(config, "veto", folder);
+  resolve_path(config, "corrections", folder);
   resolve_dataset_paths(config, "datasets", folder);
   if (config.contains("leakage")) resolve_dataset_paths(config["leakage"], "test_sets", folder);
 }

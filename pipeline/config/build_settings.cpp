@@ -59,7 +59,11 @@ const Settings<BuildConfig>& build_settings() {
        .words = profile_names()},
       {.key = "veto",
        .member = &BuildConfig::veto,
-       .description = "a list of samples to leave out, see below. `build --veto FILE` replaces it"}};
+       .description = "a list of samples to leave out, see below. `build --veto FILE` replaces it"},
+      {.key = "corrections",
+       .member = &BuildConfig::corrections,
+       .description = "keypoints that replace those of the annotation files, as `quadruped3d corrections` "
+                      "writes them. `build --corrections FILE` replaces it. See docs/export.md"}};
   return kSettings;
 }
 

@@ -134,6 +134,13 @@ ordered_json describe_veto(const std::optional<candidates::Veto>& veto) {
   return {{"sha256", veto->sha256}, {"ids", veto->reasons.size()}, {"matched", veto->matched}};
 }
 
+ordered_json describe_corrections(const std::optional<candidates::Corrections>& corrections) {
+  if (!corrections) return nullptr;
+  return {{"sha256", corrections->sha256},
+          {"ids", corrections->points.size()},
+          {"matched", corrections->matched}};
+}
+
 ordered_json describe_leakage(const DatasetInputs& inputs) {
   const std::optional<candidates::LeakageSummary>& leakage = inputs.ingest->leakage;
   if (!leakage) return nullptr;
@@ -255,6 +262,7 @@ std::string dataset_json(const DatasetInputs& inputs, const std::vector<manifest
                                   {{"config", inputs.config->as_written},
                                    {"annotations", inputs.ingest->annotation_digests},
                                    {"veto", describe_veto(inputs.ingest->veto)},
+                                   {"corrections", describe_corrections(inputs.ingest->corrections)},
                                    {"leakage", describe_leakage(inputs)},
                                    {"checkpoint_sha256", text_or_null(inputs.assets->checkpoint)},
                                    {"smal_asset_sha256", text_or_null(inputs.assets->smal_asset)},

@@ -30,29 +30,40 @@ std::set<std::string> dataset_names(const json& annotations) {
   return names;
 }
 
-// Whether dataset.json tells of a build with this config. `veto` is the digest of the config's veto list, or
-// null.
+// SHA-256 of a list that the config may name, or null.
+json digest_of(const fs::path& file) {
+  return file.empty() ? json() : json(manifests::sha256_file(file));
+}
+
+// The same, as dataset.json has it. Versions before 0.3 know no corrections.
+json built_digest(const json& provenance, const char* list) {
+  const json built = provenance.value(list, json());
+  return built.is_null() ? built : built.at("sha256");
+}
+
+// Whether dataset.json tells of a build with this config. `veto` and `corrections` are the digests of the
+// config's lists.
 bool is_of(const json& document, const config::BuildConfig& config, const stages::StageKeys& keys,
-           const json& veto) {
+           const json& veto, const json& corrections) {
   const json& provenance = document.at("provenance");
-  const json& built_veto = provenance.at("veto");
   return document.at("name") == config.name && document.at("version") == config.version &&
          provenance.at("stage_keys").at("shards") == keys.shards &&
          dataset_names(provenance.at("annotations")) == dataset_names(config) &&
-         (built_veto.is_null() ? built_veto : built_veto.at("sha256")) == veto &&
+         built_digest(provenance, "veto") == veto && built_digest(provenance, "corrections") == corrections &&
          provenance.at("leakage").is_null() == !config.leakage.has_value();
 }
 
 std::vector<BuiltVersion> built_versions(const config::BuildConfig& config, const stages::StageKeys& keys,
                                          const fs::path& out) {
-  const json veto = config.veto.empty() ? json() : json(manifests::sha256_file(config.veto));
+  const json veto = digest_of(config.veto);
+  const json corrections = digest_of(config.corrections);
   std::vector<BuiltVersion> versions;
   for (const fs::directory_entry& entry : fs::directory_iterator(out)) {
     const fs::path file = entry.path() / "dataset.json";
     if (entry.is_symlink() || !fs::exists(file)) continue;
     try {
       const json document = json::parse(manifests::read_file(file));
-      if (!is_of(document, config, keys, veto)) continue;
+      if (!is_of(document, config, keys, veto, corrections)) continue;
       versions.push_back({entry.path(), document.at("content_id").get<std::string>()});
     } catch (const json::exception& error) {
       throw std::runtime_error(

@@ -1,0 +1,120 @@
+#include "pipeline/candidates/corrections.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <sstream>
+
+#include "loaders/keypoints/topology.h"
+#include "manifests/atomic_file.h"
+#include "manifests/digest.h"
+#include "manifests/file_descriptor.h"
+#include "pipeline/run/errors.h"
+
+namespace q3d::pipeline::candidates {
+namespace {
+
+using manifests::Reason;
+
+constexpr std::size_t kCells = 5;
+
+std::string read_text(const std::filesystem::path& file) {
+  try {
+    return manifests::read_file(file);
+  } catch (const manifests::IoError& error) {
+    if (!error.names_no_file()) throw;
+    throw run::ConfigError(fmt::format("corrections: {}", error.what()));
+  }
+}
+
+std::vector<std::string> cells_of(const std::string& line) {
+  std::vector<std::string> cells;
+  std::istringstream rest(line);
+  for (std::string cell; std::getline(rest, cell, '\t');) cells.push_back(std::move(cell));
+  return cells;
+}
+
+template <typename Number>
+bool read_number(const std::string& text, Number& number) {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  return error == std::errc() && end == text.data() + text.size();
+}
+
+const std::vector<std::string>& names() {
+  static const std::vector<std::string> all = loaders::keypoints::topology("animal3d26").keypoints;
+  return all;
+}
+
+// Returns false if the cells are no point.
+bool read_point(const std::vector<std::string>& cells, CorrectedPoint& point) {
+  if (cells.size() != kCells || cells[0].empty()) return false;
+  const auto found = std::find(names().begin(), names().end(), cells[1]);
+  point.keypoint = static_cast<std::size_t>(found - names().begin());
+  return found != names().end() && read_number(cells[2], point.x_px) && read_number(cells[3], point.y_px) &&
+         read_number(cells[4], point.v) && std::isfinite(point.x_px) && std::isfinite(point.y_px) &&
+         point.v >= 0 && point.v <= 2;
+}
+
+void apply(const std::vector<CorrectedPoint>& points, manifests::SampleRecord& record) {
+  if (record.failure != Reason::none && record.failure != Reason::no_visible_keypoints) return;
+  for (const CorrectedPoint& point : points) {
+    record.keypoints[point.keypoint] = {point.x_px, point.y_px, static_cast<float>(point.v),
+                                        point.v > 0 ? 1.0F : 0.0F};
+  }
+  const bool is_visible = std::any_of(record.keypoints.begin(), record.keypoints.end(),
+                                      [](const auto& keypoint) { return keypoint.weight > 0.0F; });
+  record.failure = is_visible ? Reason::none : Reason::no_visible_keypoints;
+  record.failure_detail = is_visible ? "" : "corrections: no keypoint is labelled any more";
+}
+
+}  // namespace
+
+Corrections read_corrections(const std::filesystem::path& file) {
+  const std::string text = read_text(file);
+  Corrections corrections;
+  corrections.sha256 = manifests::sha256(text);
+  std::istringstream lines(text);
+  std::string line;
+  for (int number = 1; std::getline(lines, line); ++number) {
+    if (line.ends_with('\r')) line.pop_back();
+    if (line.empty() || line.starts_with('#')) continue;
+    const std::vector<std::string> cells = cells_of(line);
+    CorrectedPoint point;
+    if (!read_point(cells, point)) {
+      throw run::ConfigError(
+          fmt::format("{}: line {}: got \"{}\", expected a sample id, the name of a keypoint, x and y in "
+                      "pixels, and v (0, 1 "
+                      "or 2), with tabs between them",
+                      file.string(), number, line));
+    }
+    corrections.points[cells[0]].push_back(point);
+  }
+  return corrections;
+}
+
+std::string corrections_text(const std::map<std::string, std::vector<CorrectedPoint>>& points) {
+  std::string text =
+      "# sample id, keypoint, x, y (px of the source picture), v: for `quadruped3d build "
+      "--corrections`\n";
+  for (const auto& [id, corrected] : points) {
+    for (const CorrectedPoint& point : corrected) {
+      text += fmt::format("{}\t{}\t{}\t{}\t{}\n", id, names().at(point.keypoint), point.x_px, point.y_px,
+                          point.v);
+    }
+  }
+  return text;
+}
+
+void apply_corrections(Corrections& corrections, std::vector<manifests::SampleRecord>& records) {
+  for (manifests::SampleRecord& record : records) {
+    const auto found = corrections.points.find(record.id);
+    if (found == corrections.points.end()) continue;
+    ++corrections.matched;
+    apply(found->second, record);
+  }
+}
+
+}  // namespace q3d::pipeline::candidates

@@ -1,0 +1,64 @@
+// The folder that an export fills: whole files alone, resumable, with a manifest written last.
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "manifests/journal.h"
+#include "manifests/lock.h"
+
+namespace q3d::pipeline::exports {
+
+// While an export runs, its folder holds `.parts`: a lock, what is exported, and the finished units' records
+// with their journal. `export.json` exists when the export is complete; `.parts` is gone then.
+class ExportFolder {
+ public:
+  // `about` says what is exported and how; equal exports have equal words there. Throws run::ConfigError if
+  // the folder holds another export or other files, and std::runtime_error if another export writes there or
+  // a file of a complete export is gone or damaged.
+  ExportFolder(std::filesystem::path out, nlohmann::ordered_json about);
+
+  const std::filesystem::path& path() const { return out_; }
+  bool is_complete() const { return complete_; }
+  // export.json of a complete export.
+  const nlohmann::ordered_json& manifest() const { return manifest_; }
+
+  // The records of a unit. A part with another input digest, or with damaged bytes, does not count.
+  bool has_part(std::int64_t unit, const std::string& input_digest);
+  void save_part(std::int64_t unit, const std::string& input_digest, std::int64_t rows,
+                 std::string_view text);
+  std::string part(std::int64_t unit) const;  // of a unit that has one; throws std::runtime_error if damaged
+
+  // Writes a file that the manifest lists, and the folders that lead to it.
+  void write(const std::string& name, std::string_view content);
+  // Writes the manifest, with `summary` in it, and removes the parts.
+  void finish(const nlohmann::ordered_json& summary);
+
+  struct File {
+    std::string sha256;
+    std::size_t bytes = 0;
+  };
+  const std::map<std::string, File>& files() const { return files_; }
+
+ private:
+  bool open_complete();
+  void open_parts();
+  void check_same(const nlohmann::ordered_json& found, const std::filesystem::path& file) const;
+
+  std::filesystem::path out_;
+  std::filesystem::path parts_;
+  nlohmann::ordered_json about_;
+  nlohmann::ordered_json manifest_;
+  bool complete_ = false;
+  std::unique_ptr<manifests::FolderLock> lock_;
+  std::unique_ptr<manifests::Journal> journal_;
+  std::map<std::string, File> files_;
+};
+
+}  // namespace q3d::pipeline::exports

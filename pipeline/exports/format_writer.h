@@ -1,0 +1,65 @@
+// What differs between the formats of an export: names of pictures, records, and the files made of them.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "manifests/shard.h"
+#include "pipeline/exports/croissant.h"
+#include "pipeline/exports/export_dataset.h"
+#include "pipeline/exports/export_folder.h"
+#include "pipeline/exports/picture.h"
+
+namespace q3d::pipeline::exports {
+
+// A sample and its place in the dataset.
+struct ExportedSample {
+  const manifests::ShardSample& sample;
+  const ExportedPicture& picture;
+  std::int64_t unit = 0;
+  std::int64_t row = 0;
+};
+
+// A file of a picture or mask, relative to the export's folder.
+struct PictureFile {
+  std::string name;
+  const std::vector<std::byte>* bytes = nullptr;
+};
+
+// Thread-safe, but for assemble().
+class FormatWriter {
+ public:
+  virtual ~FormatWriter() = default;
+  // Which kind of picture the format needs, where pictures may be exported.
+  virtual Pictures pictures() const = 0;
+  // The files of the sample's picture; none where it has none.
+  virtual std::vector<PictureFile> picture_files(const ExportedSample& exported) const = 0;
+  // The sample's part of the unit's records: lines, each with its line feed.
+  virtual std::string lines(const ExportedSample& exported) const = 0;
+  // Takes the records of the next unit; units come in order.
+  virtual void take(const std::string& lines) = 0;
+  // Writes the annotation files. Returns what croissant.json is to say of them.
+  virtual std::vector<CroissantRecords> assemble(ExportFolder& folder) = 0;
+  virtual std::vector<std::string> picture_patterns() const = 0;
+};
+
+// What a writer knows of the whole dataset before it sees the samples.
+struct ExportedDataset {
+  std::string title;       // "name version (folder)"
+  std::string content_id;  // of the dataset
+  std::string suffix;      // of the pictures: "jpg" or "png"
+  std::size_t unit_size = 0;
+  // Of the samples' species, sorted by name, with the family of its first sample. The empty name stands for
+  // an unknown species.
+  std::vector<std::pair<std::string, manifests::Family>> species;
+};
+
+std::unique_ptr<FormatWriter> make_prima_writer(ExportedDataset dataset);
+std::unique_ptr<FormatWriter> make_coco_writer(ExportedDataset dataset);
+
+// A name that can be part of a path: every other character is replaced by "-".
+std::string path_part(const std::string& name);
+
+}  // namespace q3d::pipeline::exports
