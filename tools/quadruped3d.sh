@@ -31,3 +31,4 @@ fi
 "$program" build "${layers[@]}" --out "$out"
 "$program" verify "$out"
 "$program" inspect "$out" --sheet "$out/sheet.png"
+"$program" report "$out"

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # The paper's three stages on the rendered world, from a stem that knows photographs (models/README.md):
-#   tools/sample_loop.sh model             pools, pre-trained encoders, Stage 1 (long schedule): models/small.safetensors
+#   tools/sample_loop.sh model             the network that ships learns on; with another stem, it gets this one first
 #   tools/sample_loop.sh loop SCHEDULE SEED   Stage 1, Stage 2, Stage 3, and both networks on the test sets
 # SCHEDULE is full or quick. Every step does what is missing, so a run that was stopped goes on where it was.
 set -euo pipefail
@@ -34,23 +34,34 @@ prepare() {
       --priors "$home/priors.safetensors" --smal-asset data/world/assets/smal_synthetic.safetensors
 }
 
-# The encoders of the full and the quick schedule are the same; those of the long one are trained longer.
-encoders_of() {
-  if [ "$1" = long ]; then echo pretrain-long; else echo pretrain; fi
+pretrain() {
+  say "pre-training of the image encoders, shared by all stages"
+  train --config configs/world_training.json --stage pretrain --out "$home/pretrain"
 }
 
-pretrain() {
-  local schedule=$1 layers=(--config configs/world_training.json)
-  [ "$schedule" != long ] || layers+=(--config configs/world_training_long.json)
-  say "pre-training of the image encoders, shared by all stages"
-  train "${layers[@]}" --stage pretrain --out "$home/$(encoders_of "$schedule")"
+# What ships may have another stem than an untrained network has today; then its encoders have to learn anew to place
+# keypoints. The digest in the folder's name keeps runs from different starts apart.
+model() {
+  local shipped=models/small.safetensors
+  local run stage=further
+  run=$home/further-$(sha256sum "$shipped" | cut -c 1-12)
+  mkdir -p "$run"
+  grep -aq backbone.patch_embed.efficientnet "$shipped" || stage=graft
+  [ -f "$run/initial.safetensors" ] ||
+    .venv/bin/python tools/graft.py "$home/initial.safetensors" "$shipped" "$run/initial.safetensors"
+  printf '{ "network": { "initial": "initial.safetensors" } }\n' >"$run/run.json"
+  say "the network that ships learns on"
+  train --config configs/world_training.json --config configs/world_training_further.json --config "$run/run.json" \
+    --stage "$stage" --out "$run/trained"
+  evaluate "$run/trained" "$run/evaluation"
+  say "trained: $run/trained/model.safetensors"
 }
 
 # The training config's layers for a schedule and a seed; Stage 3 reads what this loop's Stage 2 made.
 layers() {
   local schedule=$1 seed=$2 run=$3
   cat >"$run/run.json" <<JSON
-{ "network": { "encoders": "../$(encoders_of "$schedule")/model.safetensors" },
+{ "network": { "encoders": "../pretrain/model.safetensors" },
   "pools": { "quadruped3d": { "shards": ["stage2/latest"], "weight": 0.5 } },
   "model_dtype": "float16",
   "seed": $seed }
@@ -100,13 +111,11 @@ loop() {
 case "${1:-}" in
   model)
     prepare
-    pretrain long
-    stage1 long 0 "$home/long-0"
-    say "trained: $home/long-0/stage1/model.safetensors (models/small.safetensors ships such a network)"
+    model
     ;;
   loop)
     prepare
-    pretrain "${2:-full}"
+    pretrain
     loop "${2:-full}" "${3:-0}"
     ;;
   *)

@@ -61,7 +61,7 @@ char separator_of(std::string_view text) {
 // Says whose table begins with this cell, if it is known.
 std::string known_table(std::string_view first_cell) {
   if (first_cell == "track" || first_cell == "frame_idx" || first_cell == "instance.score") {
-    return " (this is SLEAP's analysis CSV: export the project to COCO, see docs/own-labels.md)";
+    return " (SLEAP's analysis CSV begins with \"track\" too, but has the columns frame_idx and nose.x)";
   }
   if (first_cell.find(' ') != std::string_view::npos &&
       first_cell.find_first_not_of("0123456789.- eE") == std::string_view::npos) {

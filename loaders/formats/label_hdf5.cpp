@@ -323,15 +323,11 @@ std::string frame_group(hid_t file) {
   if (H5Lexists(file, kUsual, H5P_DEFAULT) > 0) return kUsual;
   const std::vector<std::string> names = manifests::hdf5::link_names(file, "root group");
   if (names.size() == 1) return names.front();
-  const auto has = [&](const char* name) {
-    return std::find(names.begin(), names.end(), name) != names.end();
-  };
-  const bool is_sleap = (has("tracks") && has("node_names")) || (has("instances") && has("points"));
-  refuse("root group", fmt::format("the members {}", names.empty() ? "(none)" : joined_names(names)),
-         is_sleap
-             ? fmt::format("{}. This is SLEAP's file: export the project to COCO, see docs/own-labels.md",
-                           kUsual)
-             : fmt::format("{}, or one table alone. Save the table that you want under this key", kUsual));
+  refuse(
+      "root group", fmt::format("the members {}", names.empty() ? "(none)" : joined_names(names)),
+      fmt::format("{}, or one table alone, or SLEAP's labels or analysis. Save the table that you want under "
+                  "this key",
+                  kUsual));
 }
 
 LabelTable read_open_file(hid_t file, std::uint64_t file_bytes) {

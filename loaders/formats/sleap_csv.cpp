@@ -59,6 +59,12 @@ bool is_sleap_csv(const std::string& text) {
 LabelTable read_sleap_csv(const std::string& text, const std::string& where) {
   const std::vector<std::string> header = header_of(text, where);
   const std::vector<std::string> nodes = nodes_of(header);
+  if (nodes.empty()) {
+    throw std::runtime_error(
+        fmt::format("{}: line 1: got no pair of columns such as nose.x and nose.y, expected those of SLEAP's "
+                    "analysis CSV",
+                    where));
+  }
   CsvTableReader lines(text, where);
   const auto has = [&](const std::string& name) {
     return std::find(header.begin(), header.end(), name) != header.end();

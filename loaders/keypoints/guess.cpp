@@ -196,15 +196,15 @@ class Guesser {
     }
   }
 
-  // A keypoint of the 26 maps only together with its mirror image.
+  // A keypoint of the 26 maps together with its mirror image, or alone if only one side is labelled.
   void drop_lone_sides() {
     const Topology& animal3d = topology("animal3d26");
     for (std::size_t i = 0; i < topology_.source.size(); ++i) {
       const auto mirror = static_cast<std::size_t>(animal3d.flip[i]);
       const int here = topology_.source[i];
       const int there = topology_.source[mirror];
-      const bool fits = here < 0 || topology_.flip[static_cast<std::size_t>(here)] == there;
-      if (fits) continue;
+      const int partner = here < 0 ? -1 : topology_.flip[static_cast<std::size_t>(here)];
+      if (here < 0 || (there >= 0 ? partner == there : partner == here)) continue;
       doubts_.push_back(fmt::format(
           "\"{}\" looks like {}, but nothing that is its mirror image looks like {}; "
           "it is left out",

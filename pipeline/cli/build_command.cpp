@@ -61,7 +61,7 @@ void print_summary(const build::BuildSummary& summary) {
              summary.folder.string());
   fmt::print(stderr, "  all verdicts: {}\n", (summary.folder / "verdicts.csv").string());
   fmt::print(stderr, "next: {}\n      {}\n", run::command_line({"verify", summary.folder.string()}),
-             run::command_line({"inspect", summary.folder.string(), "--sheet", "sheet.png"}));
+             run::command_line({"report", summary.folder.string()}));
 }
 
 // Counts by the enumerators' names.

@@ -77,6 +77,7 @@ int parse_and_run(std::vector<std::string> words, std::span<const CommandEntry> 
       "  quadruped3d calibrate --config configs/sample.json --out out --write out/thresholds.json\n"
       "  quadruped3d build --config configs/sample.json --config out/thresholds.json --out out\n"
       "  quadruped3d verify out\n"
+      "  quadruped3d report out\n"
       "`quadruped3d help COMMAND` explains a command with examples.");
   const auto commands = add_commands(app, entries);
   try {

@@ -18,7 +18,7 @@ class Stem : public ::testing::Test {
   std::string refusal(const smal::tensors::NamedTensors& tensors) const {
     smal::tensors::write_safetensors(path("broken"), tensors);
     try {
-      PretrainedStem{path("broken")};
+      [[maybe_unused]] const PretrainedStem stem(path("broken"));
     } catch (const std::runtime_error& error) {
       return error.what();
     }
