@@ -71,9 +71,11 @@ FoundPicture PictureFinder::find(const std::string& name) {
   const std::vector<NameReading> readings = readings_of(name);
   if (readings.empty()) return {{}, Reason::image_missing, fmt::format("\"{}\", which names no file", name)};
   for (std::size_t i = 0; i < readings.size(); ++i) {
+    const std::size_t counted = found_by_reading_;
     auto found = find_exactly(readings[i]);
     if (!found) continue;
-    if (i > 0 && !readings[i].is_absolute && found->failure == Reason::none) ++found_by_reading_;
+    const bool is_other_reading = i > 0 && !readings[i].is_absolute && found->failure == Reason::none;
+    if (is_other_reading && counted == found_by_reading_) ++found_by_reading_;
     return std::move(*found);
   }
   for (const NameReading& reading : readings) {

@@ -91,6 +91,7 @@ NameReading reading_of(std::string_view text, bool is_absolute) {
   fs::path normal = fs::path(text).lexically_normal();
   const bool begins_at_root = normal.is_absolute();
   if (begins_at_root) normal = normal.relative_path();
+  while (is_absolute && climbs_out(normal)) normal = normal.lexically_relative("..");
   return {std::move(normal), is_absolute || begins_at_root, begins_at_root && !is_absolute};
 }
 

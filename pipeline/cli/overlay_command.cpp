@@ -22,6 +22,7 @@ struct Arguments {
   std::size_t best = 0;
   std::size_t near_threshold = 0;
   bool plain = false;
+  ConfigArguments config;
   bool json = false;
 };
 
@@ -64,7 +65,7 @@ void output_options(CLI::App& command, Arguments& arguments) {
   command.add_flag("--plain", arguments.plain, "draw the panels without captions");
   command.add_flag("--obj", options.obj, "also write each body as Wavefront OBJ");
   command.add_flag("--glb", options.glb, "also write each body as binary glTF");
-  config_option(command, options.configs,
+  config_option(command, arguments.config,
                 "the build's config, if pictures or the body model are not found without it");
   command.add_option("--body", options.body, "body model (default: the one that the dataset was made with)")
       ->check(CLI::ExistingFile);
@@ -86,6 +87,9 @@ report::OverlayOptions options_of(Arguments arguments) {
   order(report::Order::best, arguments.best);
   order(report::Order::near_threshold, arguments.near_threshold);
   options.captions = !arguments.plain;
+  if (!arguments.config.files.empty()) {
+    options.config = config::load_build_config(arguments.config.files, arguments.config.settings());
+  }
   if (arguments.panels.empty()) return options;
   options.panels.clear();
   for (const std::string& name : arguments.panels) {

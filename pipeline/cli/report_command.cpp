@@ -15,11 +15,16 @@ namespace {
 
 struct Arguments {
   report::ReportOptions options;
+  ConfigArguments config;
   bool json = false;
 };
 
 int run(const Arguments& arguments) {
-  const report::ReportSummary summary = report::write_report(arguments.options, network::load_body_meshes);
+  report::ReportOptions options = arguments.options;
+  if (!arguments.config.files.empty()) {
+    options.config = config::load_build_config(arguments.config.files, arguments.config.settings());
+  }
+  const report::ReportSummary summary = report::write_report(options, network::load_body_meshes);
   fmt::print(stderr, "{}: {}\nopen it in a browser; it needs no network\n",
              summary.was_up_to_date ? "the report was up to date" : "wrote the report",
              summary.page.string());
@@ -45,7 +50,7 @@ Command add_report(CLI::App& app) {
   command->add_option("--gallery", options.gallery_size, "pictures in each gallery; 0 leaves them out")
       ->capture_default_str()
       ->check(CLI::Range(0, 100));
-  config_option(*command, options.configs,
+  config_option(*command, arguments->config,
                 "the build's config, if pictures or the body model are not found without it");
   command->add_option("--body", options.body, "body model (default: the one that the dataset was made with)")
       ->check(CLI::ExistingFile);

@@ -115,8 +115,9 @@ struct BuildConfig {
   CalibrateConfig calibrate;
   std::optional<LeakageConfig> leakage;
   std::filesystem::path veto;  // ids to leave out (pipeline/candidates/veto.h); empty when there are none
-  std::filesystem::path corrections;  // keypoints (pipeline/candidates/corrections.h); empty when there are none
-  nlohmann::json as_written;   // the merged JSON, paths as the user wrote them
+  std::filesystem::path
+      corrections;            // keypoints (pipeline/candidates/corrections.h); empty when there are none
+  nlohmann::json as_written;  // the merged JSON, paths as the user wrote them
 };
 
 // Whether a config with pseudo labels must have the key "network". `leakage` reads no network.

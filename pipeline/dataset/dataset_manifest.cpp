@@ -20,7 +20,7 @@ using manifests::csv_cell;
 using manifests::Verdict;
 using nlohmann::ordered_json;
 
-ordered_json to_json(const Counts& counts) {
+ordered_json counts_json(const Counts& counts) {
   return {{"candidates", counts.candidates},
           {"retained", counts.retained},
           {"refined", counts.refined},
@@ -42,7 +42,7 @@ class Statistics {
   ordered_json to_json() const {
     ordered_json object = ordered_json::object();
     for (const auto& [label, group] : groups_) {
-      ordered_json entry = dataset::to_json(group.counts);
+      ordered_json entry = counts_json(group.counts);
       if (group.initial.count > 0) entry["mean_initial_error_of_kept"] = group.initial.mean();
       if (group.final.count > 0) entry["mean_final_error_of_kept"] = group.final.mean();
       object[label] = std::move(entry);
@@ -249,7 +249,7 @@ std::string dataset_json(const DatasetInputs& inputs, const std::vector<manifest
                                  {"key", keys.dataset},
                                  {"content_id", content_id(shards)},
                                  {"toolkit", run::version()},
-                                 {"counts", to_json(counts)},
+                                 {"counts", counts_json(counts)},
                                  {"labels", count_labels(*inputs.ingest, judgements)},
                                  {"datasets", describe_datasets(*inputs.config)},
                                  {"profile", inputs.config->profile},

@@ -38,7 +38,7 @@ std::unique_ptr<device::BodyMeshes> bodies_for(const SheetOptions& options,
       throw MissingBodyModel("the shard lies in no dataset that names one; give --body FILE");
     }
     const dataset::PublishedDataset dataset(folder);
-    const SourceFiles files(dataset.output_folder(), {});
+    const SourceFiles files(dataset.output_folder(), nullptr);
     return load_bodies(find_body_model(dataset, files, options.body));
   } catch (const MissingBodyModel& error) {
     run::log_note(fmt::format("the sheet shows keypoints without meshes: {}", error.what()));

@@ -124,7 +124,7 @@ OverlaySummary draw_overlays(const OverlayOptions& options, const device::BodyMe
     throw std::runtime_error(fmt::format(
         "{}: no candidate passes the filters; `quadruped3d inspect` counts them", dataset.version_name()));
   }
-  const SourceFiles files(dataset.output_folder(), options.configs);
+  const SourceFiles files(dataset.output_folder(), options.config ? &*options.config : nullptr);
   const std::unique_ptr<device::BodyMeshes> bodies =
       load_bodies(find_body_model(dataset, files, options.body));
   if (!options.folder.empty()) fs::create_directories(options.folder);

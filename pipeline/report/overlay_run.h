@@ -2,10 +2,12 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "pipeline/config/build_config.h"
 #include "pipeline/device/body_meshes.h"
 #include "pipeline/report/overlay_choice.h"
 #include "pipeline/report/overlay_painter.h"
@@ -13,9 +15,9 @@
 namespace q3d::pipeline::report {
 
 struct OverlayOptions {
-  std::filesystem::path dataset;               // a version's folder, or an output folder
-  std::vector<std::filesystem::path> configs;  // the build's, where pictures or the body are not found
-  std::filesystem::path body;                  // body model; empty: the one that the dataset was made with
+  std::filesystem::path dataset;              // a version's folder, or an output folder
+  std::optional<config::BuildConfig> config;  // the build's, where pictures or the body are not found
+  std::filesystem::path body;                 // body model; empty: the one that the dataset was made with
   Choice choice;
   std::vector<Panel> panels{kAllPanels.begin(), kAllPanels.end()};
   bool captions = true;

@@ -74,7 +74,7 @@ class ReportWriter {
   ReportWriter(const ReportOptions& options, const device::BodyMeshesLoader& load_bodies)
       : options_(options),
         dataset_(options.dataset),
-        files_(dataset_.output_folder(), options.configs),
+        files_(dataset_.output_folder(), options.config ? &*options.config : nullptr),
         load_bodies_(load_bodies) {}
 
   ReportSummary write() {

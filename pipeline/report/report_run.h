@@ -3,18 +3,19 @@
 
 #include <cstddef>
 #include <filesystem>
-#include <vector>
+#include <optional>
 
+#include "pipeline/config/build_config.h"
 #include "pipeline/device/body_meshes.h"
 
 namespace q3d::pipeline::report {
 
 struct ReportOptions {
-  std::filesystem::path dataset;               // a version's folder, or an output folder
-  std::vector<std::filesystem::path> configs;  // the build's, where pictures or the body are not found
-  std::filesystem::path body;                  // body model; empty: the one that the dataset was made with
-  std::filesystem::path folder;                // empty: <output folder>/report/<version>
-  std::size_t gallery_size = 6;                // pictures in each gallery; 0 draws none
+  std::filesystem::path dataset;              // a version's folder, or an output folder
+  std::optional<config::BuildConfig> config;  // the build's, where pictures or the body are not found
+  std::filesystem::path body;                 // body model; empty: the one that the dataset was made with
+  std::filesystem::path folder;               // empty: <output folder>/report/<version>
+  std::size_t gallery_size = 6;               // pictures in each gallery; 0 draws none
 };
 
 struct ReportSummary {

@@ -6,7 +6,6 @@
 #include "manifests/digest.h"
 #include "manifests/known_files.h"
 #include "pipeline/candidates/configured_dataset.h"
-#include "pipeline/config/build_config.h"
 #include "pipeline/run/errors.h"
 
 namespace q3d::pipeline::report {
@@ -23,12 +22,11 @@ std::optional<std::vector<std::byte>> read_expected(const fs::path& path, const 
 
 }  // namespace
 
-SourceFiles::SourceFiles(const fs::path& output_folder, const std::vector<fs::path>& configs)
+SourceFiles::SourceFiles(const fs::path& output_folder, const config::BuildConfig* config)
     : known_(manifests::read_known_files(output_folder / "digests.txt")) {
-  if (configs.empty()) return;
-  const config::BuildConfig config = config::load_build_config(configs);
-  if (!config.network.smal_asset.empty()) configured_bodies_.push_back(config.network.smal_asset);
-  for (const config::DatasetConfig& dataset : config.datasets) {
+  if (config == nullptr) return;
+  if (!config->network.smal_asset.empty()) configured_bodies_.push_back(config->network.smal_asset);
+  for (const config::DatasetConfig& dataset : config->datasets) {
     if (!dataset.body_model.empty()) configured_bodies_.push_back(dataset.body_model);
     for (const manifests::SampleRecord& record : candidates::load_configured(dataset).records) {
       if (!record.image_path.empty()) configured_.emplace(record.id, record.image_path);

@@ -8,15 +8,17 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/config/build_config.h"
+
 namespace q3d::pipeline::report {
 
 // A published dataset names its files by SHA-256 alone. Two places know where they lie: OUT/digests.txt,
 // which the build left, and the build's config. Every file is compared with its digest before it is used.
 class SourceFiles {
  public:
-  // `configs` may be empty. With them, the annotation files are read for the paths of the pictures. Throws
-  // ConfigError for a config that is wrong, and manifests::IoError.
-  SourceFiles(const std::filesystem::path& output_folder, const std::vector<std::filesystem::path>& configs);
+  // `config` may be null. With it, the annotation files are read for the paths of the pictures. Throws as
+  // candidates::load_configured does, and manifests::IoError.
+  SourceFiles(const std::filesystem::path& output_folder, const config::BuildConfig* config);
 
   // The bytes of a candidate's picture. Nothing if no file with this digest is known, or if it has changed.
   // Throws manifests::IoError for a file that is there and cannot be read.

@@ -107,6 +107,18 @@ ordered_json visible_keypoints(const Facts& facts) {
   return {{"candidates", candidates}, {"kept", kept}};
 }
 
+ordered_json trust_histogram(const Facts& facts) {
+  Histogram histogram(0.0, 1.0, 20);
+  bool is_measured = false;
+  for (const CandidateFacts& candidate : facts.candidates) {
+    const double trust = candidate.row.judgement.trust.combined;
+    if (!candidate.row.label || !std::isfinite(trust)) continue;
+    histogram.add(trust);
+    is_measured = true;
+  }
+  return is_measured ? histogram_json(histogram) : ordered_json(nullptr);
+}
+
 ordered_json sizes(const Facts& facts) {
   std::vector<double> widths, heights, boxes;
   std::int64_t below = 0;

@@ -20,6 +20,10 @@ nlohmann::ordered_json adaptation(const Facts& facts, std::size_t most = 2500);
 // How many candidates, and how many kept ones, have 0 to 26 visible keypoints.
 nlohmann::ordered_json visible_keypoints(const Facts& facts);
 
+// The combined trust of the kept labels, 20 bins from 0 to 1: {low, high, beyond, counts}. Null where none
+// was measured.
+nlohmann::ordered_json trust_histogram(const Facts& facts);
+
 // Widths and heights of pictures, and the longer sides of boxes, in px: quantiles {min, q05, q25, median,
 // q75, q95, max} and a histogram of the boxes' longer sides with 30 bins. Boxes below the crop of the network
 // (256 px) are enlarged for it; `boxes_below_crop` counts them.

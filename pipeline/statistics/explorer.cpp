@@ -58,9 +58,12 @@ ordered_json rule_json(const ordered_json& document) {
   const ordered_json& config = document.at("provenance").at("config");
   const ordered_json tta = config.contains("tta") ? config["tta"] : ordered_json::object();
   const config::TtaConfig defaults;
+  const ordered_json filter = config.contains("filter") ? config["filter"] : ordered_json::object();
   return {{"iterations_min", tta.value("iterations_min", defaults.iterations_min)},
           {"iterations_max", tta.value("iterations_max", defaults.iterations_max)},
           {"gain_window", filters::Thresholds{}.gain_window},
+          {"refine_retained", tta.value("refine_retained", defaults.refine_retained)},
+          {"min_trust", filter.value("min_trust", 0.0)},
           {"guarded", is_guarded(document)}};
 }
 
@@ -79,8 +82,10 @@ ordered_json explorer(const Facts& facts, const dataset::DatasetManifest& manife
   Names datasets, species;
   std::map<std::string, std::pair<std::int64_t, std::int64_t>> others;  // candidates and kept
   ordered_json columns = ordered_json::object();
-  constexpr const char* kColumns[] = {"dataset",        "group",      "error",     "gain", "iterations",
-                                      "best_iteration", "auc_before", "auc_after", "kept", "fixed"};
+  bool has_trust = false;
+  constexpr const char* kColumns[] = {"dataset",    "group",          "error",      "gain",
+                                      "iterations", "best_iteration", "auc_before", "auc_after",
+                                      "kept",       "fixed",          "trust"};
   for (const char* name : kColumns) columns[name] = ordered_json::array();
   for (const CandidateFacts& candidate : facts.candidates) {
     const manifests::Judgement& judgement = candidate.row.judgement;
@@ -105,8 +110,11 @@ ordered_json explorer(const Facts& facts, const dataset::DatasetManifest& manife
                                                    : ordered_json(nullptr));
     columns["kept"].push_back(is_kept ? 1 : 0);
     columns["fixed"].push_back(is_fixed(judgement.reason) ? 1 : 0);
+    columns["trust"].push_back(rounded(judgement.trust.combined, 6));
+    has_trust = has_trust || std::isfinite(judgement.trust.combined);
   }
   if (columns["error"].empty()) return nullptr;
+  if (!has_trust) columns.erase("trust");
   ordered_json rest = ordered_json::object();
   for (const auto& [name, counts] : others) rest[name] = {counts.first, counts.second};
   ordered_json object = {{"thresholds", thresholds_json(manifest)}, {"rule", rule_json(document)}};

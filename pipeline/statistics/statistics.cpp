@@ -61,6 +61,7 @@ ordered_json statistics(const dataset::PublishedDataset& dataset, const Facts& f
           {"keypoints", keypoint_table(facts)},
           {"visible", visible_keypoints(facts)},
           {"sizes", sizes(facts)},
+          {"trust", trust_histogram(facts)},
           {"shape", shape_space(facts)},
           {"explorer", explorer(facts, manifest, document)},
           {"thresholds", document.at("thresholds")},

@@ -11,8 +11,8 @@ inline constexpr const char* kStatisticsFormat = "quadruped3d-statistics";
 inline constexpr int kStatisticsSchema = 1;
 
 // The document: format, schema, dataset {...}, counts, labels, funnel, reasons, groups, errors, adaptation,
-// accuracy, keypoints, visible, sizes, shape, explorer, notes, provenance. docs/report.md explains each part.
-// No time, host or path of its own: equal datasets give equal bytes. Throws like gather, and
+// accuracy, keypoints, visible, sizes, trust, shape, explorer, notes, provenance. docs/report.md explains
+// each part. No time, host or path of its own: equal datasets give equal bytes. Throws like gather, and
 // std::runtime_error for a dataset.json that is damaged.
 nlohmann::ordered_json statistics(const dataset::PublishedDataset& dataset, const Facts& facts);
 

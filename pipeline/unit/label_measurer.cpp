@@ -70,7 +70,7 @@ manifests::TrustScores LabelMeasurer::measure_one(const UnitWork& work, const La
   manifests::TrustScores scores;
   scores.visible = visible_keypoints(keypoints);
   scores.aux_2d = filters::mean_absolute_difference(smal::numbers_of(body.aux_keypoints_2d),
-                                                     smal::numbers_of(body.keypoints_2d));
+                                                    smal::numbers_of(body.keypoints_2d));
   scores.aux_3d = filters::procrustes_error_mm(body.aux_keypoints_3d, body.keypoints_3d);
   scores.sides = filters::left_right_ratio(body.keypoints_2d, keypoints, mirror_);
   if (priors_) {

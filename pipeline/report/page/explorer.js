@@ -1,7 +1,7 @@
 // The threshold explorer: the fidelity rule once more, on the numbers that the build left of each candidate.
 //
 // What is known for sure of a candidate under other thresholds:
-//   L_proj below tau_low        kept as predicted
+//   L_proj below tau_low        kept as predicted; with tta.refine_retained, as adapted in this build
 //   L_proj from tau_high on     discarded
 //   between, adapted before     its gain in the first iterations does not depend on the thresholds, so neither does
 //                               its verdict; its label is the same if the best iterate lies within the new number of
@@ -21,17 +21,21 @@ function bandOf(error, t) {
   return error >= t.tau_high ? "high" : "middle";
 }
 
-// {outcome, label}: label is "prediction", "refined" (the built one) or null where it is not known.
+// {outcome, label}: label is "prediction", "built" (the one of this build) or null where it is not known.
 function outcomeOf(e, i, t, built) {
   if (e.fixed[i]) return { outcome: OUT, label: null };
+  const hasLabel = e.kept[i] || (e.trust && e.trust[i] !== null);
   const error = e.error[i], band = bandOf(error, t), before = bandOf(error, built);
   if (e.rule.guarded) {
     const same = band === before && (band !== "middle" || (t.delta === built.delta && iterationsFor(error, t, e.rule) === iterationsFor(error, built, e.rule)));
     if (band === "high") return { outcome: OUT, label: null };
     if (!same) return { outcome: UNKNOWN, label: null };
-    return e.kept[i] ? { outcome: KEPT, label: band === "low" ? "prediction" : "refined" } : { outcome: OUT, label: null };
+    return hasLabel ? { outcome: KEPT, label: "built" } : { outcome: OUT, label: null };
   }
-  if (band === "low") return { outcome: KEPT, label: "prediction" };
+  if (band === "low") {
+    if (before === "low") return { outcome: KEPT, label: hasLabel ? "built" : "prediction" };
+    return { outcome: KEPT, label: e.rule.refine_retained ? null : "prediction" };
+  }
   if (band === "high") return { outcome: OUT, label: null };
   const taken = e.iterations[i];
   if (taken === 0 || e.gain[i] === null) return { outcome: UNKNOWN, label: null };
@@ -40,19 +44,19 @@ function outcomeOf(e, i, t, built) {
     const enough = stopped || taken >= Math.min(e.rule.gain_window, wanted);
     return { outcome: enough ? OUT : UNKNOWN, label: null };
   }
-  const sameLabel = e.kept[i] && wanted >= e.best_iteration[i] && (wanted <= taken || stopped);
-  return { outcome: KEPT, label: sameLabel ? "refined" : null };
+  const sameLabel = before === "middle" && hasLabel && wanted >= e.best_iteration[i] && (wanted <= taken || stopped);
+  return { outcome: KEPT, label: sameLabel ? "built" : null };
 }
 
-// Counts under thresholds by dataset: {low, high, refinedLow, ..., unknown, auc: {sum, known, unknown}, species: [[low, high], ...]}.
+// Counts under thresholds by dataset: {kept: [low, high], retained, unknown, auc: {sum, known, unknown}, species: [[low,
+// high], ...]}. `retained` are those of the kept that lie below tau_low.
 function explore(e, thresholds, minTrust) {
   const result = { kept: [0, 0], retained: 0, unknown: 0, auc: { sum: 0, known: 0, unknown: 0 }, species: e.species.map(() => [0, 0]) };
   for (let i = 0; i < e.error.length; ++i) {
     const name = e.datasets[e.dataset[i]], built = e.thresholds[name];
     let { outcome, label } = outcomeOf(e, i, thresholds[name], built);
     if (outcome !== OUT && minTrust > 0 && e.trust) {
-      const known = label === (bandOf(e.error[i], built) === "low" ? "prediction" : "refined") && e.trust[i] !== null;
-      if (!known) outcome = UNKNOWN;
+      if (label !== "built" || e.trust[i] === null) outcome = UNKNOWN;
       else if (e.trust[i] < minTrust) outcome = OUT;
     }
     if (outcome === OUT) continue;
@@ -66,8 +70,8 @@ function explore(e, thresholds, minTrust) {
     ++result.kept[1];
     ++result.species[e.group[i]][0];
     ++result.species[e.group[i]][1];
-    if (label === "prediction") ++result.retained;
-    const auc = label === "prediction" ? e.auc_before[i] : label === "refined" ? e.auc_after[i] : null;
+    if (bandOf(e.error[i], thresholds[name]) === "low") ++result.retained;
+    const auc = label === "prediction" ? e.auc_before[i] : label === "built" ? e.auc_after[i] ?? null : null;
     if (auc === null) ++result.auc.unknown;
     else {
       result.auc.sum += auc;
@@ -95,7 +99,7 @@ function setUpExplorer() {
   const names = Object.keys(e.thresholds).filter((name) => e.datasets.includes(name));
   const chosen = Object.fromEntries(names.map((name) => [name, { ...e.thresholds[name] }]));
   const same = names.every((name) => ["tau_low", "tau_high", "delta"].every((key) => e.thresholds[name][key] === e.thresholds[names[0]][key]));
-  const state = { scope: same ? "" : names[0], minTrust: 0 };
+  const state = { scope: same ? "" : names[0], minTrust: e.rule.min_trust };
   const scopeNames = () => (state.scope === "" ? names : [state.scope]);
   const sorted = [...e.error].sort((a, b) => a - b);
   const top = Math.max(sorted[Math.floor(0.98 * (sorted.length - 1))], ...names.map((name) => 1.2 * e.thresholds[name].tau_high));
@@ -142,7 +146,7 @@ function setUpExplorer() {
   reset.type = "button";
   reset.addEventListener("click", () => {
     for (const name of names) Object.assign(chosen[name], e.thresholds[name]);
-    state.minTrust = 0;
+    state.minTrust = e.rule.min_trust;
     show();
   });
   controls.append(reset);
@@ -161,7 +165,7 @@ function setUpExplorer() {
     plotted = plotSpecies(e, result, plotted);
   };
   const start = () => {
-    const wanted = fromAddress({ ...chosen[scopeNames()[0]], min_trust: 0 });
+    const wanted = fromAddress({ ...chosen[scopeNames()[0]], min_trust: e.rule.min_trust });
     for (const name of scopeNames()) Object.assign(chosen[name], { tau_low: wanted.tau_low, tau_high: Math.max(wanted.tau_low, wanted.tau_high), delta: wanted.delta });
     state.minTrust = wanted.min_trust;
     show();
@@ -178,8 +182,8 @@ function showNumbers(e, result) {
   const named = (id, ...rest) => { tile(tiles, ...rest).firstChild.id = id; };
   named("explored-kept", range(kept, whole), "labels in the dataset", "#009e73");
   named("explored-yield", range(kept.map((k) => k / total), percent), "yield", "#009e73");
-  named("explored-retained", whole(result.retained), "retained as predicted", VERDICT_COLOURS.retained);
-  named("explored-refined", range(result.kept.map((k) => k - result.retained), whole), "refined", VERDICT_COLOURS.refined);
+  named("explored-retained", whole(result.retained), "below tau_low", VERDICT_COLOURS.retained);
+  named("explored-refined", range(result.kept.map((k) => k - result.retained), whole), "adapted and kept", VERDICT_COLOURS.refined);
   const auc = result.auc.known ? (result.auc.sum / result.auc.known).toFixed(1) : "-";
   named("explored-auc", auc, result.auc.unknown ? `AUC of the ${whole(result.auc.known)} labels that are known` : "AUC of the labels", INK);
   const parts = [];

@@ -63,10 +63,10 @@ TEST(QualityWarnings, ACeilingThatWasPassedStaysAWarning) {
 
 TEST(Ceiling, IsItselfAllowed) {
   EXPECT_NO_THROW(require_below_ceiling("animals", 0.1, 0.1));
-  EXPECT_THAT([] { require_below_ceiling("animals", 0.27, 0.1); },
-              ThrowsMessage<std::runtime_error>(AllOf(HasSubstr("dataset animals is 0.27"),
-                                                      HasSubstr("tau_ceiling = 0.1"),
-                                                      HasSubstr("--above-ceiling"))));
+  EXPECT_THAT(
+      [] { require_below_ceiling("animals", 0.27, 0.1); },
+      ThrowsMessage<std::runtime_error>(AllOf(HasSubstr("dataset animals is 0.27"),
+                                              HasSubstr("tau_ceiling = 0.1"), HasSubstr("--above-ceiling"))));
 }
 
 TEST(Labels, ADatasetWithoutAnyIsRefusedWithItsReasons) {

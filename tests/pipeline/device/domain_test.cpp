@@ -14,7 +14,8 @@ using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
 NetworkDomain rendered() {
-  return {Pictures::rendered, "the world", "its test pictures", 500, {{0.05, 0.01}, {0.5, 0.04}, {0.95, 0.125}}};
+  return {
+      Pictures::rendered, "the world", "its test pictures", 500, {{0.05, 0.01}, {0.5, 0.04}, {0.95, 0.125}}};
 }
 
 TEST(Domain, ComesBackFromItsText) {
@@ -40,7 +41,8 @@ TEST(Domain, RefusesAnotherForm) {
   expect_refused("[]", "expected the form");
   expect_refused(R"({"trained_on": "x"})", "pictures");
   expect_refused(R"({"pictures": "drawn", "trained_on": "x"})", "unknown kind of pictures \"drawn\"");
-  const std::string begin = R"({"pictures": "rendered", "trained_on": "x", "held_out": {"what": "y", "pictures": 3,)";
+  const std::string begin =
+      R"({"pictures": "rendered", "trained_on": "x", "held_out": {"what": "y", "pictures": 3,)";
   expect_refused(begin + R"("l_proj": {"0.5": 0.4, "0.95": 0.2}}})", "ascending errors");
   expect_refused(begin + R"("l_proj": {"1.5": 0.4}}})", "shares between 0 and 1");
 }
