@@ -24,7 +24,8 @@ double log_of(double value) {
   return std::log(std::max(value, 1e-6));
 }
 
-// Fitted by `tools/trust_scores.py --fit` (docs/results.md).
+// A first guess: equal weights, and means and deviations of the order that the scores have on the rendered
+// world. `tools/trust_scores.py --fit` fits them to a pool whose truth is known.
 constexpr double kBias = 1.1;
 const std::array<Term, 4> kTerms{{
     {[](const Judgement& j) { return log_of(j.trust.mirror); }, 4.0, 0.4, -0.5},

@@ -8,11 +8,10 @@ namespace q3d::filters {
 // Raise it when the weights change: it is part of the shards' key.
 inline constexpr int kTrustVersion = 1;
 
-// Returns how far a label can be trusted, from 0 to 1, 1 = most: the probability of a logistic regression
-// that its PA-MPJPE is not among the worst quarter. Its weights were fitted on one rendered world by
-// tools/trust_scores.py and are frozen; docs/results.md says what they are worth on other worlds. A score
-// that is NaN counts as average. Returns NaN for a judgement that keeps no label or of which nothing was
-// measured.
+// Returns how far a label can be trusted, from 0 to 1, 1 = most, by a logistic function of weighted scores.
+// The weights are a first guess and not fitted yet, so the number orders labels and is no probability. A
+// score that is NaN counts as average. Returns NaN for a judgement that keeps no label or of which nothing
+// was measured.
 double combined_trust(const manifests::Judgement& judgement);
 
 }  // namespace q3d::filters

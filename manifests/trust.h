@@ -39,7 +39,7 @@ inline constexpr std::array<TrustColumn, 10> kTrustColumns{{
      "mean distance of the body's keypoints from those predicted for the mirrored picture, after Procrustes "
      "alignment"},
     {"trust_aux_2d", &TrustScores::aux_2d, "crop units",
-     "mean |difference| of the decoder's auxiliary 2D keypoints and the body's, over all 26 and both "
+     "mean absolute difference of the decoder's auxiliary 2D keypoints and the body's, over all 26 and both "
      "coordinates"},
     {"trust_aux_3d", &TrustScores::aux_3d, "mm",
      "mean distance of the decoder's auxiliary 3D keypoints from the body's, after Procrustes alignment"},

@@ -25,7 +25,7 @@ Pose rotation_matrices(const AxisAnglePose& axis_angle) {
   return matrices;
 }
 
-std::array<double, kNumJoints * 3> axis_angles(const std::array<float, kNumJoints * 9>& matrices) {
+std::array<double, kNumJoints * 3> axis_angles(const Pose& matrices) {
   std::array<double, kNumJoints * 3> vectors{};
   for (std::size_t joint = 0; joint < kNumJoints; ++joint) {
     const Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>> matrix(&matrices[9 * joint]);

@@ -11,6 +11,6 @@ Pose rotation_matrices(const AxisAnglePose& axis_angle);
 
 // The inverse: 35 row-major rotation matrices to 35 axis-angle vectors (rad), computed in double by unit
 // quaternions. The angles lie in [0, pi].
-std::array<double, kNumJoints * 3> axis_angles(const std::array<float, kNumJoints * 9>& matrices);
+std::array<double, kNumJoints * 3> axis_angles(const Pose& matrices);
 
 }  // namespace q3d::smal

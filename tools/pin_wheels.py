@@ -1,9 +1,6 @@
 #!/usr/bin/env python3
 """Writes tools/requirements.txt: the version and SHA-256 of every wheel that tools/requirements.in needs.
 
-    tools/pin_wheels.py            requirements.in -> requirements.txt
-    tools/pin_wheels.py --extra    requirements-extra.in -> requirements-extra.txt
-
 Run it after changing requirements.in, and review the difference. It asks pip to resolve the requirements for each of
 PYTHONS on each of MACHINES, without installing anything. Where the package index does not offer the wheels' metadata,
 pip has to download the wheels: about 3 GB for each combination.
@@ -19,8 +16,7 @@ import tempfile
 import urllib.parse
 
 HERE = pathlib.Path(__file__).resolve().parent
-NAME = "requirements-extra" if "--extra" in sys.argv[1:] else "requirements"
-SOURCE, TARGET = HERE / f"{NAME}.in", HERE / f"{NAME}.txt"
+SOURCE, TARGET = HERE / "requirements.in", HERE / "requirements.txt"
 PYTHONS = ("3.11", "3.12")  # Debian 12, Ubuntu 24.04
 MACHINES = ("x86_64", "aarch64")
 GLIBC_MINOR = 36  # Debian 12 has glibc 2.36, Ubuntu 24.04 has 2.39
@@ -55,7 +51,7 @@ def render(resolved: list[dict[str, tuple[str, str, str]]]) -> str:
     """Returns the text of requirements.txt. Throws ValueError when a package has different versions on the targets."""
     lines = [
         f"# CPython {', '.join(PYTHONS)} on Linux ({', '.join(MACHINES)})",
-        f"# tools/pin_wheels.py writes this file from {SOURCE.name}. pip accepts these wheels and no others.",
+        "# tools/pin_wheels.py writes this file from requirements.in. pip accepts these wheels and no others.",
     ]
     faults = []
     for name in sorted(set().union(*resolved)):

@@ -17,6 +17,13 @@ from safetensors_file import Tensor
 from torch_checkpoint import TorchFile
 
 CONFIG_KEY = "prima_config"
+# What build and calibrate compare a pool with (pipeline/device/domain.h). The paper's tables have AUC and PCK, which
+# give no quantile of L_proj; tools/describe_checkpoint.py adds them for those who have its test sets.
+DOMAIN_KEY = "prima_domain"
+OFFICIAL_DOMAIN = {
+    "pictures": "photographs",
+    "trained_on": "the official PRIMA data: Animal3D, CtrlAni3D and Quadruped2D or Quadruped3D (arXiv:2606.02366)",
+}
 _WEIGHT_DTYPES = ("F32", "F16", "BF16")
 _MAX_FAULTS_SHOWN = 40
 
@@ -63,7 +70,8 @@ def import_checkpoint(
         settings = _open_clip_settings(open_clip_config, config) | settings
     origin = _apply_settings(config, settings, root.get("hyper_parameters"))
     kept = [name for name in expected if name in tensors and (keep_text or expected[name].group != names.TEXT)]
-    safetensors_file.write(target, {name: tensors[name] for name in kept}, _metadata(config, source))
+    metadata = _metadata(config, source) | {DOMAIN_KEY: json.dumps(OFFICIAL_DOMAIN)}
+    safetensors_file.write(target, {name: tensors[name] for name in kept}, metadata)
 
     groups = Counter(expected[name].group for name in kept)
     say(f"{target}: {len(kept)} of {len(tensors)} tensors ({', '.join(f'{key} {groups[key]}' for key in groups)})")

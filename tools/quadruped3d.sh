@@ -12,7 +12,9 @@ mkdir -p "$out"
 
 if [ -z "$config" ]; then
   config=configs/sample.json
-  [ -f data/sample_world/world.json ] || "$program" sample --out data/sample_world --share 0.08 --seed 1
+  # A world of an earlier version lacks the priors; `sample` adds them and leaves the pictures as they are.
+  [ -f data/sample_world/world.json ] && [ -f data/sample_world/assets/priors_synthetic.safetensors ] ||
+    "$program" sample --out data/sample_world --share 0.08 --seed 1
 fi
 
 layers=(--config "$config")

@@ -23,9 +23,9 @@ struct FoundPicture {
 // The folders that names count from. All of them are relative to the root unless they are absolute.
 struct PictureFolders {
   std::filesystem::path root;
-  std::filesystem::path images;          // named by the user; it may lie outside the root
-  std::filesystem::path default_images;  // the format's own, used if `images` is empty and the root has it
-  std::filesystem::path annotations;     // folder of the annotation file; empty if it is not known
+  std::filesystem::path images{};          // named by the user; it may lie outside the root
+  std::filesystem::path default_images{};  // the format's own, used if `images` is empty and the root has it
+  std::filesystem::path annotations{};     // folder of the annotation file; empty if it is not known
 };
 
 // Looks up a name in each of its readings (picture_name.h), the most literal one first:

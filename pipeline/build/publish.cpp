@@ -6,31 +6,13 @@
 #include <stdexcept>
 
 #include "manifests/atomic_file.h"
+#include "manifests/link_file.h"
 #include "pipeline/run/log.h"
 
 namespace q3d::pipeline::build {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr fs::perms kReadOnly = fs::perms::owner_read | fs::perms::group_read | fs::perms::others_read;
-
-// A hard link where the file system has them, so that versions that share a shard share its bytes; else a
-// copy. A file that is there under another name than `from` (a damaged one, say) is replaced in one step.
-void link_or_copy(const fs::path& from, const fs::path& to) {
-  std::error_code error;
-  if (!fs::equivalent(from, to, error)) {
-    const fs::path temporary = to.string() + ".tmp";
-    fs::create_hard_link(from, temporary, error);
-    if (error) {
-      fs::copy_file(from, temporary, fs::copy_options::overwrite_existing);
-      manifests::commit_file(temporary, to);
-    } else {
-      fs::rename(temporary, to);  // its bytes were made durable when the stage wrote them
-    }
-  }
-  fs::permissions(to, kReadOnly, error);  // immutable as far as a plain user goes
-}
 
 std::vector<dataset::ShardEntry> link_shards(const fs::path& folder, const candidates::Ingest& ingest,
                                              stages::StageStore& shards) {
@@ -42,7 +24,7 @@ std::vector<dataset::ShardEntry> link_shards(const fs::path& folder, const candi
     const auto entry = shards.entry(unit);
     if (!entry) throw std::runtime_error(fmt::format("unit {} has no finished shard", unit.index));
     const std::string name = fmt::format("shards/{:06}.h5", unit.index);
-    link_or_copy(shards.file(unit), folder / name);
+    manifests::link_or_copy(shards.file(unit), folder / name);
     entries.push_back({name, entry->sha256, entry->bytes, entry->rows, unit.index});
   }
   return entries;

@@ -58,7 +58,7 @@ bool read_point(const std::vector<std::string>& cells, CorrectedPoint& point) {
          point.v >= 0 && point.v <= 2;
 }
 
-void apply(const std::vector<CorrectedPoint>& points, manifests::SampleRecord& record) {
+void correct(const std::vector<CorrectedPoint>& points, manifests::SampleRecord& record) {
   if (record.failure != Reason::none && record.failure != Reason::no_visible_keypoints) return;
   for (const CorrectedPoint& point : points) {
     record.keypoints[point.keypoint] = {point.x_px, point.y_px, static_cast<float>(point.v),
@@ -113,7 +113,7 @@ void apply_corrections(Corrections& corrections, std::vector<manifests::SampleRe
     const auto found = corrections.points.find(record.id);
     if (found == corrections.points.end()) continue;
     ++corrections.matched;
-    apply(found->second, record);
+    correct(found->second, record);
   }
 }
 

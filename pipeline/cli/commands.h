@@ -18,7 +18,7 @@ struct CommandInfo {
   bool needs_network;                 // links LibTorch, and is therefore in the program quadruped3d-network
   std::string_view network_option{};  // with this option, the command runs there too
 };
-inline constexpr std::array<CommandInfo, 21> kCommands{{
+inline constexpr std::array<CommandInfo, 24> kCommands{{
     {"build", "make a versioned dataset of labels from annotated photographs", true},
     {"calibrate", "find the thresholds that give the wanted shares of labels", true},
     {"predict", "give the bodies of animals in photographs, with or without keypoints", true},
@@ -40,6 +40,9 @@ inline constexpr std::array<CommandInfo, 21> kCommands{{
     {"topology", "write a topology file for a lab's labels, and show which points are left and right", false},
     {"export", "write a dataset in another project's format: PRIMA, COCO, Parquet, Hugging Face", false},
     {"corrections", "take corrected keypoints and vetoes back from an exported COCO file", false},
+    {"merge", "join finished datasets to a new version", false},
+    {"subset", "make a version of the candidates that fulfil a condition", false},
+    {"diff", "show which verdicts and labels changed between two versions, and by how much", false},
     {"curate", "choose a balanced subset of a large dataset, by species; build takes the list", false},
 }};
 
@@ -73,5 +76,8 @@ Command add_curate(CLI::App& app);
 Command add_topology(CLI::App& app);
 Command add_export(CLI::App& app);
 Command add_corrections(CLI::App& app);
+Command add_merge(CLI::App& app);
+Command add_subset(CLI::App& app);
+Command add_diff(CLI::App& app);
 
 }  // namespace q3d::pipeline::cli

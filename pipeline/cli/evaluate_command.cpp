@@ -2,11 +2,14 @@
 
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 
+#include "manifests/atomic_file.h"
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/options.h"
+#include "pipeline/evaluation/paper_tables.h"
 #include "pipeline/evaluation/report.h"
 #include "pipeline/run/progress.h"
 
@@ -19,8 +22,18 @@ struct Arguments {
   std::filesystem::path out;
   evaluation::EvaluationOptions options;
   bool species = false;
+  bool paper_tables = false;
   bool json = false;
 };
+
+void write_paper_tables(const Arguments& arguments, const evaluation::Evaluation& result,
+                        const evaluation::Tables& tables) {
+  const bool is_rendered = std::any_of(result.datasets.begin(), result.datasets.end(),
+                                       [](const auto& dataset) { return dataset.is_rendered; });
+  const std::string text = evaluation::paper_tables(tables, is_rendered);
+  manifests::write_file_atomically(arguments.out / "paper_tables.md", text);
+  fmt::print(arguments.json ? stderr : stdout, "\n{}", text);
+}
 
 int run(const Arguments& arguments) {
   const auto config = evaluation::load_evaluation_config(arguments.config.files, arguments.checkpoint,
@@ -32,6 +45,7 @@ int run(const Arguments& arguments) {
   for (const auto& dataset : result.datasets) {
     for (const std::string& note : dataset.notes) fmt::print(stderr, "note: {}: {}\n", dataset.name, note);
   }
+  if (arguments.paper_tables) write_paper_tables(arguments, result, tables);
   std::FILE* const people = arguments.json ? stderr : stdout;
   fmt::print(people, "\n{} (sha256 {}...) on {}, in {}\n\n{}", result.checkpoint,
              result.checkpoint_sha256.substr(0, 12), result.device, run::human_duration(result.seconds),
@@ -81,6 +95,9 @@ Command add_evaluate(CLI::App& app) {
       ->check(CLI::ExistingFile);
   out_option(*command, arguments->out, "folder for evaluation.json, samples.csv and tables.csv")->required();
   add_settings(*command, arguments->options);
+  command->add_flag(
+      "--paper-tables", arguments->paper_tables,
+      "also print the paper's tables with the paper's numbers, and write them to OUT/paper_tables.md");
   command->add_flag("--species", arguments->species, "also show the table by species");
   threads_option(*command, arguments->options.threads);
   json_flag(*command, arguments->json, "print evaluation.json to stdout");

@@ -16,7 +16,7 @@ int main(int argc, char** argv) {
   if (words.size() > command && cli::needs_network(words.subspan(command))) {
     return cli::become_network_program(argv);
   }
-  constexpr std::array<cli::CommandEntry, 9> kEntries{{
+  constexpr std::array<cli::CommandEntry, 12> kEntries{{
       {"verify", cli::add_verify},
       {"inspect", cli::add_inspect},
       {"config", cli::add_config},
@@ -26,6 +26,9 @@ int main(int argc, char** argv) {
       {"topology", cli::add_topology},
       {"export", cli::add_export},
       {"corrections", cli::add_corrections},
+      {"merge", cli::add_merge},
+      {"subset", cli::add_subset},
+      {"diff", cli::add_diff},
   }};
   return cli::run_program(argc, argv, kEntries);
 }

@@ -43,12 +43,18 @@ void order_options(CLI::App& command, Arguments& arguments) {
 }
 
 void filter_options(CLI::App& command, report::Choice& choice) {
-  command.add_option("--verdict", choice.verdicts, "only these verdicts or reasons")->delimiter(',');
+  command.add_option("--verdict", choice.verdicts, "only these verdicts or reasons")
+      ->delimiter(',')
+      ->allow_extra_args(false);
   command.add_option("--species", choice.species, "only these species, as verdicts.csv names them")
-      ->delimiter(',');
-  command.add_option("--family", choice.families, "only these families")->delimiter(',');
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  command.add_option("--family", choice.families, "only these families")
+      ->delimiter(',')
+      ->allow_extra_args(false);
   command.add_option("--dataset-name", choice.datasets, "only candidates of these datasets of the config")
-      ->delimiter(',');
+      ->delimiter(',')
+      ->allow_extra_args(false);
 }
 
 void output_options(CLI::App& command, Arguments& arguments) {
@@ -61,7 +67,8 @@ void output_options(CLI::App& command, Arguments& arguments) {
   command
       .add_option("--panels", arguments.panels,
                   "panels to draw: photo, prediction, label, side, keypoints (default: all)")
-      ->delimiter(',');
+      ->delimiter(',')
+      ->allow_extra_args(false);
   command.add_flag("--plain", arguments.plain, "draw the panels without captions");
   command.add_flag("--obj", options.obj, "also write each body as Wavefront OBJ");
   command.add_flag("--glb", options.glb, "also write each body as binary glTF");

@@ -74,7 +74,7 @@ int draw_sheet(const Arguments& arguments, const fs::path& topology) {
   topology::SheetOptions options = arguments.sheet;
   options.labels = arguments.draft.from;
   options.topology = topology;
-  for (const std::string& note : topology::draw_label_sheet(options)) fmt::print(stderr, "note: {}\n", note);
+  for (const auto& note : topology::draw_label_sheet(options)) fmt::print(stderr, "note: {}\n", note.text);
   fmt::print(stderr, "wrote {}: left is blue, right is orange\n", options.sheet.string());
   return 0;
 }

@@ -42,6 +42,7 @@ LoadedDataset load(const EvaluatedDataset& dataset, std::int64_t limit) {
   auto [read, annotations_sha256] = candidates::read_dataset(source, digests);
   loaded.result.name = source.name + "/" + source.split;
   loaded.result.annotations_sha256 = std::move(annotations_sha256);
+  loaded.result.is_rendered = candidates::is_rendered(source.root);
   for (auto& note : read.notes) loaded.result.notes.push_back(std::move(note.text));
   loaded.result.listed = static_cast<std::int64_t>(read.records.size());
   if (!dataset.truth.empty()) {

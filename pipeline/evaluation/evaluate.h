@@ -41,6 +41,7 @@ struct DatasetResult {
   std::string annotations_sha256;
   std::string truth_sha256;  // of the hidden truth; empty when there is none
   std::int64_t listed = 0;   // samples of the annotation file; `limit` may take fewer
+  bool is_rendered = false;  // its pictures come from `sample`
   std::vector<std::string> notes;
   std::vector<SampleResult> samples;
 };

@@ -108,7 +108,7 @@ HiddenTruth::HiddenTruth(const std::filesystem::path& file, const std::filesyste
     fail(file.string(), "expected a JSON object with \"pictures\": {<name>: {...}}");
   }
   std::optional<loaders::formats::PictureFinder> finder;
-  if (!masks.empty()) finder.emplace(masks, std::filesystem::path(), std::filesystem::path());
+  if (!masks.empty()) finder.emplace(loaders::formats::PictureFolders{.root = masks});
   for (const auto& [name, object] : document["pictures"].items()) {
     pictures_[name] = read_picture(object, file.string() + ": " + name, finder ? &*finder : nullptr);
   }

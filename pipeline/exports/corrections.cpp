@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
-#include "loaders/keypoints/topology.h"
+#include "loaders/keypoints/name_match.h"
 #include "loaders/pictures/affine.h"
 #include "manifests/atomic_file.h"
 #include "manifests/json_file.h"
@@ -51,8 +51,12 @@ std::vector<std::size_t> order_of(const CocoFile& file) {
     const auto names = category.value("keypoints", std::vector<std::string>());
     if (names.empty()) continue;
     try {
-      const std::vector<int> order = loaders::keypoints::order_in_file(topology, names);
-      return {order.begin(), order.end()};
+      const loaders::keypoints::NameMatch match = loaders::keypoints::match_names(topology, names);
+      if (!match.missing.empty()) {
+        fail(file.path, fmt::format("categories: keypoints: {} is missing, expected the 26 of the export",
+                                    match.missing.front()));
+      }
+      return {match.places.begin(), match.places.end()};
     } catch (const std::invalid_argument& error) {
       fail(file.path, fmt::format("categories: keypoints: {}", error.what()));
     }

@@ -64,7 +64,7 @@ class Exporter {
 
  private:
   std::unique_ptr<FormatWriter> make_writer() const {
-    std::set<std::string> encodings;
+    std::set<manifests::ImageEncoding> encodings;
     std::map<std::string, manifests::Family> species;
     for (const ShardEntry& entry : dataset_.manifest().shards) {
       const manifests::ShardReader shard = dataset_.open_shard(entry);
@@ -85,7 +85,7 @@ class Exporter {
     exported.title = fmt::format("{} {} ({})", dataset_.manifest().name, dataset_.manifest().version,
                                  dataset_.version_name());
     exported.content_id = dataset_.manifest().content_id;
-    exported.suffix = encodings.contains("jpeg") ? "jpg" : "png";
+    exported.suffix = encodings.contains(manifests::ImageEncoding::jpeg) ? "jpg" : "png";
     exported.unit_size = dataset_.manifest().unit_size;
     exported.species.assign(species.begin(), species.end());
     return options_.format == Format::prima ? make_prima_writer(std::move(exported))
@@ -138,7 +138,7 @@ class Exporter {
     folder_.save_part(entry.unit, entry.sha256, shard.rows(), text);
   }
 
-  std::string export_sample(const ShardSample& sample, const std::string& encoding, std::int64_t unit,
+  std::string export_sample(const ShardSample& sample, manifests::ImageEncoding encoding, std::int64_t unit,
                             std::int64_t row) const {
     const bool has_picture = !sample.crop.empty() && is_licensed(source_of(sample));
     const ExportedPicture picture =
@@ -177,7 +177,7 @@ class Exporter {
     std::set<std::string> without;
     for (const ShardEntry& entry : dataset_.manifest().shards) {
       const manifests::ShardReader shard = dataset_.open_shard(entry);
-      if (shard.header().image_encoding == "reference") continue;
+      if (shard.header().image_encoding == manifests::ImageEncoding::reference) continue;
       const auto names = shard.table().text("dataset", 0, shard.rows());
       const auto splits = shard.table().text("split", 0, shard.rows());
       for (std::size_t row = 0; row < names.size(); ++row) {

@@ -36,14 +36,14 @@ cv::Mat shifted(const cv::Mat& picture, pictures::Point shift) {
   return moved;
 }
 
-std::vector<std::byte> encoded(const cv::Mat& picture, const std::string& image_encoding) {
-  return image_encoding == "jpeg" ? pictures::encode_jpeg(picture, kJpegQuality)
-                                  : pictures::encode_png(picture);
+std::vector<std::byte> encoded(const cv::Mat& picture, manifests::ImageEncoding image_encoding) {
+  return image_encoding == manifests::ImageEncoding::jpeg ? pictures::encode_jpeg(picture, kJpegQuality)
+                                                          : pictures::encode_png(picture);
 }
 
 }  // namespace
 
-ExportedPicture export_picture(const manifests::ShardSample& sample, const std::string& image_encoding,
+ExportedPicture export_picture(const manifests::ShardSample& sample, manifests::ImageEncoding image_encoding,
                                Pictures wanted) {
   if (wanted == Pictures::none) {
     return {{}, {}, sample.image_width_px, sample.image_height_px, {1.0, 0.0, 0.0, 0.0, 1.0, 0.0}};

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "loaders/pictures/affine.h"
+#include "manifests/image_encoding.h"
 #include "manifests/shard.h"
 
 namespace q3d::pipeline::exports {
@@ -33,7 +34,7 @@ struct ExportedPicture {
 // filter and encoded anew: JPEG of quality 95, or PNG. Other crops keep their bytes.
 //
 // Throws std::runtime_error if the stored crop does not decode.
-ExportedPicture export_picture(const manifests::ShardSample& sample, const std::string& image_encoding,
+ExportedPicture export_picture(const manifests::ShardSample& sample, manifests::ImageEncoding image_encoding,
                                Pictures pictures);
 
 // The sample's box in the exported picture. square_box() of it is the network's crop in that picture.

@@ -29,7 +29,7 @@ ordered_json pose_of(const manifests::ShardSample& sample) {
   if (sample.label_kind == manifests::LabelKind::truth) {
     return numbers(sample.record.truth.value().pose_axis_angle);
   }
-  return smal::axis_angles(sample.pose);
+  return smal::axis_angles(sample.body.pose);
 }
 
 ordered_json keypoints_2d(const manifests::ShardSample& sample, const ExportedPicture& picture) {
@@ -57,10 +57,10 @@ ordered_json prima_record(const manifests::ShardSample& sample, const ExportedPi
   if (sample.has_keypoints_3d) record["keypoint_3d"] = rows(sample.keypoints_3d, 3);
   if (sample.has_pose) {
     record["pose"] = pose_of(sample);
-    record["trans"] = numbers(sample.trans);
+    record["trans"] = numbers(sample.body.translation);
   }
   if (sample.has_betas) {
-    const std::span<const float> betas(sample.betas);
+    const std::span<const float> betas(sample.body.betas);
     record["shape"] = numbers(betas.first(kFirstBetas));
     record["shape_extra"] = numbers(betas.subspan(kFirstBetas));
   }

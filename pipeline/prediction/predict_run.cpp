@@ -143,12 +143,13 @@ class Predictor {
     const std::size_t first = animals_.size();
     for (std::size_t i = 0; i < work.candidates.size(); ++i) {
       const unit::PredictedSample& sample = (*work.predicted)[i];
-      animals_.push_back({.record = work.candidates[i].record,
-                          .failure = sample.failure,
-                          .detail = sample.detail,
-                          .image_width_px = sample.image_width_px,
-                          .image_height_px = sample.image_height_px,
-                          .body = sample.body});
+      PredictedAnimal& animal = animals_.emplace_back();
+      animal.record = work.candidates[i].record;
+      animal.failure = sample.failure;
+      animal.detail = sample.detail;
+      animal.image_width_px = sample.image_width_px;
+      animal.image_height_px = sample.image_height_px;
+      animal.body = sample.body;
     }
     if (work.refined) {
       for (const unit::RefinedSample& refined : *work.refined)

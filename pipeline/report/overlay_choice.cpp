@@ -60,15 +60,25 @@ std::vector<VerdictRow> with_id(const std::vector<VerdictRow>& rows, const std::
     if (row.id.find(id) != std::string::npos) found.push_back(row);
   }
   if (found.empty()) {
-    throw std::runtime_error(fmt::format("no candidate's id is or contains {}; verdicts.csv lists them", id));
+    throw std::runtime_error(fmt::format(
+        "no candidate that passes the filters has an id that is or contains {}; verdicts.csv lists all", id));
   }
   return found;
 }
 
-std::vector<VerdictRow> named(const std::vector<VerdictRow>& rows, const std::vector<std::string>& ids) {
+std::vector<VerdictRow> spread(const std::vector<VerdictRow>& rows, std::size_t count) {
+  std::vector<VerdictRow> chosen;
+  const std::size_t wanted = std::min(count, rows.size());
+  for (std::size_t i = 0; i < wanted; ++i) chosen.push_back(rows[i * rows.size() / wanted]);
+  return chosen;
+}
+
+// At most `most` for each part of an id.
+std::vector<VerdictRow> named(const std::vector<VerdictRow>& rows, const std::vector<std::string>& ids,
+                              std::size_t most) {
   std::vector<VerdictRow> found;
   for (const std::string& id : ids) {
-    for (VerdictRow& row : with_id(rows, id)) {
+    for (VerdictRow& row : spread(with_id(rows, id), most)) {
       const bool is_new = std::none_of(found.begin(), found.end(),
                                        [&](const VerdictRow& other) { return other.id == row.id; });
       if (is_new) found.push_back(std::move(row));
@@ -84,13 +94,6 @@ void sort_by(std::vector<VerdictRow>& rows, const std::function<double(const Ver
                    [&](const VerdictRow& a, const VerdictRow& b) { return number(a) < number(b); });
 }
 
-std::vector<VerdictRow> spread(const std::vector<VerdictRow>& rows, std::size_t count) {
-  std::vector<VerdictRow> chosen;
-  const std::size_t wanted = std::min(count, rows.size());
-  for (std::size_t i = 0; i < wanted; ++i) chosen.push_back(rows[i * rows.size() / wanted]);
-  return chosen;
-}
-
 }  // namespace
 
 double distance_to_threshold(const VerdictRow& row, const ThresholdsByDataset& thresholds) {
@@ -103,12 +106,15 @@ double distance_to_threshold(const VerdictRow& row, const ThresholdsByDataset& t
 std::vector<VerdictRow> choose(const std::vector<VerdictRow>& rows, const ThresholdsByDataset& thresholds,
                                const Choice& choice) {
   check_names(choice);
-  std::vector<VerdictRow> chosen = choice.ids.empty() ? rows : named(rows, choice.ids);
-  std::erase_if(chosen, [&](const VerdictRow& row) { return !passes(row, choice); });
+  const bool is_spread = choice.order == Order::spread;
+  std::vector<VerdictRow> passing = rows;
+  std::erase_if(passing, [&](const VerdictRow& row) { return !passes(row, choice); });
+  if (is_spread && choice.ids.empty()) return spread(passing, choice.count);
+  const std::size_t most = is_spread ? choice.count : rows.size();
+  std::vector<VerdictRow> chosen = choice.ids.empty() ? std::move(passing) : named(passing, choice.ids, most);
   switch (choice.order) {
     case Order::spread:
-      if (choice.ids.empty()) return spread(chosen, choice.count);
-      break;
+      return chosen;
     case Order::worst:
       sort_by(chosen, [](const VerdictRow& row) { return -row.judgement.final_error; });
       break;

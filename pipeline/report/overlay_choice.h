@@ -26,14 +26,15 @@ struct Choice {
   std::vector<std::string> datasets;
   std::vector<std::string> verdicts;  // names of verdicts, or of reasons
   Order order = Order::spread;
-  std::size_t count = 12;  // at most
+  std::size_t count = 12;  // at most; with ids and Order::spread, of each part of an id
 };
 
 using ThresholdsByDataset = std::map<std::string, filters::Thresholds>;
 
 // The chosen rows in the order that was asked for. With ids alone (Order::spread): in the order of the ids. A
 // row without the number that an order sorts by is left out. Throws ConfigError for a verdict, reason or
-// family that does not exist, and std::runtime_error for an id that no candidate has or holds.
+// family that does not exist, and std::runtime_error for an id that no candidate that passes the filters has
+// or holds.
 std::vector<dataset::VerdictRow> choose(const std::vector<dataset::VerdictRow>& rows,
                                         const ThresholdsByDataset& thresholds, const Choice& choice);
 

@@ -6,6 +6,7 @@
 
 #include "loaders/pictures/encode.h"
 #include "loaders/pictures/image.h"
+#include "loaders/pictures/orientation.h"
 #include "loaders/pictures/stored_crop.h"
 #include "manifests/enumerators.h"
 #include "pipeline/dataset/sentences.h"
@@ -92,6 +93,7 @@ class SubjectReader {
     subject.has_geometry = subject.record.box.w_px > 0 && subject.record.box.h_px > 0;
     const bool is_pseudo = dataset_.role(row) == config::Role::pseudo;
     const unit::PredictedSample& predicted = predictions->samples[place];
+    subject.image_size = {predicted.image_width_px, predicted.image_height_px};
     if (!is_pseudo || predicted.failure != manifests::Reason::none) return;
     subject.prediction = with_projection(predicted.body);
     if (row.label) return;
@@ -103,6 +105,7 @@ class SubjectReader {
     OverlaySubject kept = subject_of(dataset_.sample(row));
     subject.record = std::move(kept.record);
     subject.has_geometry = kept.has_geometry;
+    subject.image_size = kept.image_size;
     subject.label = kept.label;
     subject.picture = std::move(kept.picture);
   }
@@ -112,20 +115,25 @@ class SubjectReader {
       subject.no_picture = "the predictions of its unit are gone, and with them its box";
       return;
     }
-    const auto bytes = files_.picture(row.id, row.image_sha256);
-    if (!bytes) {
+    const auto file = files_.picture(row.id, row.image_sha256);
+    if (!file) {
       subject.no_picture = row.image_sha256.empty()
                                ? "the picture was not there when the dataset was built"
                                : "the picture was not found: it was moved or changed (--config may help)";
       return;
     }
-    const loaders::pictures::DecodedImage image = loaders::pictures::decode_image(*bytes);
+    const loaders::pictures::DecodedImage image = loaders::pictures::decode_image(file->bytes);
     if (image.failure != manifests::Reason::none) {
       subject.no_picture = image.detail;
       return;
     }
+    const cv::Mat upright = loaders::pictures::turned(image.rgb, file->orientation);
+    if (upright.size() != subject.image_size) {
+      subject.no_picture = "its labels are of the turned picture: give --config with the build's config";
+      return;
+    }
     loaders::pictures::StoredCrop crop = loaders::pictures::make_stored_crop(
-        image.rgb, {}, subject.box(), loaders::pictures::kStoredCropScale, kPictureSidePx);
+        upright, {}, subject.box(), loaders::pictures::kStoredCropScale, kPictureSidePx);
     subject.picture = {std::move(crop.rgb), crop.from_image};
   }
 
@@ -154,6 +162,7 @@ OverlaySubject subject_of(const manifests::ShardSample& sample) {
   subject.row.family = sample.record.family;
   subject.record = sample.record;
   subject.has_geometry = true;
+  subject.image_size = {sample.image_width_px, sample.image_height_px};
   subject.label = label_of(sample);
   if (!sample.crop.empty()) subject.picture = stored_picture(sample);
   return subject;

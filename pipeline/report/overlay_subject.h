@@ -27,6 +27,7 @@ struct OverlaySubject {
   std::string why;                 // what decided, as `explain` says it; empty where it is not known
   manifests::SampleRecord record;  // id, box and keypoints; no more is set
   bool has_geometry = false;       // whether box and keypoints were found
+  cv::Size image_size;             // px of the picture that box and keypoints are of
   MappedPicture picture;
   std::string no_picture;  // why there is none; empty where there is one
 

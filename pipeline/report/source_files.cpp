@@ -29,20 +29,25 @@ SourceFiles::SourceFiles(const fs::path& output_folder, const config::BuildConfi
   for (const config::DatasetConfig& dataset : config->datasets) {
     if (!dataset.body_model.empty()) configured_bodies_.push_back(dataset.body_model);
     for (const manifests::SampleRecord& record : candidates::load_configured(dataset).records) {
-      if (!record.image_path.empty()) configured_.emplace(record.id, record.image_path);
+      if (!record.image_path.empty())
+        configured_.emplace(record.id, Configured{record.image_path, record.orientation});
     }
   }
 }
 
-std::optional<std::vector<std::byte>> SourceFiles::picture(const std::string& id,
-                                                           const std::string& sha256) const {
+std::optional<SourceFiles::Picture> SourceFiles::picture(const std::string& id,
+                                                         const std::string& sha256) const {
   if (sha256.empty()) return std::nullopt;
+  if (const auto own = configured_.find(id); own != configured_.end()) {
+    if (auto bytes = read_expected(own->second.path, sha256)) {
+      return Picture{std::move(*bytes), own->second.orientation};
+    }
+  }
   const auto [first, last] = known_.equal_range(sha256);
   for (auto file = first; file != last; ++file) {
-    if (auto bytes = read_expected(file->second, sha256)) return bytes;
+    if (auto bytes = read_expected(file->second, sha256)) return Picture{std::move(*bytes)};
   }
-  const auto own = configured_.find(id);
-  return own == configured_.end() ? std::nullopt : read_expected(own->second, sha256);
+  return std::nullopt;
 }
 
 std::optional<fs::path> SourceFiles::body_model(const std::string& sha256, const fs::path& given) const {

@@ -20,9 +20,13 @@ class SourceFiles {
   // candidates::load_configured does, and manifests::IoError.
   SourceFiles(const std::filesystem::path& output_folder, const config::BuildConfig* config);
 
-  // The bytes of a candidate's picture. Nothing if no file with this digest is known, or if it has changed.
-  // Throws manifests::IoError for a file that is there and cannot be read.
-  std::optional<std::vector<std::byte>> picture(const std::string& id, const std::string& sha256) const;
+  struct Picture {
+    std::vector<std::byte> bytes;
+    int orientation = 1;  // by which the record turns the stored pixels; known with a config only
+  };
+  // A candidate's picture. Nothing if no file with this digest is known, or if it has changed. Throws
+  // manifests::IoError for a file that is there and cannot be read.
+  std::optional<Picture> picture(const std::string& id, const std::string& sha256) const;
 
   // The body model with this digest. `given` is the user's own choice and may be empty. Nothing if no file is
   // known. Throws ConfigError if `given` has another digest. An empty `sha256` (a build without a network)
@@ -31,8 +35,12 @@ class SourceFiles {
                                                   const std::filesystem::path& given) const;
 
  private:
+  struct Configured {
+    std::filesystem::path path;
+    int orientation = 1;
+  };
   std::multimap<std::string, std::filesystem::path> known_;  // by SHA-256
-  std::map<std::string, std::filesystem::path> configured_;  // pictures by id
+  std::map<std::string, Configured> configured_;             // pictures by id
   std::vector<std::filesystem::path> configured_bodies_;
 };
 

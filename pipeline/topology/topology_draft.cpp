@@ -59,7 +59,7 @@ Draft draft_topology(const DraftOptions& options) {
   return draft;
 }
 
-std::vector<std::string> draw_label_sheet(const SheetOptions& options) {
+std::vector<loaders::formats::Note> draw_label_sheet(const SheetOptions& options) {
   const loaders::formats::LabelSurvey survey = loaders::formats::survey_labels(options.labels);
   if (survey.format.empty()) {
     throw run::ConfigError(

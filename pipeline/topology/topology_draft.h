@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "loaders/formats/label_survey.h"
+#include "loaders/formats/note.h"
 #include "loaders/keypoints/guess.h"
 
 namespace q3d::pipeline::topology {
@@ -39,6 +40,6 @@ struct SheetOptions {
 // Loads the labels as a build does, draws the mapped keypoints of a few animals into their pictures, and
 // returns the loader's notes. Throws ConfigError if no format loads the file, and std::runtime_error if no
 // animal has a picture and a keypoint; the message has the first record's reason.
-std::vector<std::string> draw_label_sheet(const SheetOptions& options);
+std::vector<loaders::formats::Note> draw_label_sheet(const SheetOptions& options);
 
 }  // namespace q3d::pipeline::topology

@@ -13,6 +13,7 @@
 
 #include "manifests/atomic_file.h"
 #include "manifests/lock.h"
+#include "pipeline/animal/synthetic_files.h"
 #include "pipeline/world/annotations.h"
 #include "pipeline/world/picture.h"
 #include "pipeline/world/plan.h"
@@ -95,6 +96,14 @@ void write_json(const fs::path& path, const nlohmann::json& content) {
 void save_asset(const BodyModel& model, const fs::path& path) {
   if (path.has_parent_path()) fs::create_directories(path.parent_path());
   model.save(path);
+}
+
+// The priors of the world's bodies, for the guards and trust scores that need them.
+void save_priors(const fs::path& out) {
+  const fs::path path = out / "assets" / "priors_synthetic.safetensors";
+  if (fs::exists(path)) return;
+  fs::create_directories(path.parent_path());
+  animal::write_synthetic_priors(path);
 }
 
 std::string split_name(const PicturePlan& plan) {
@@ -197,11 +206,13 @@ WorldSummary make_world(const WorldOptions& options) {
         .pictures = pictures->get<std::map<std::string, int>>(), .reused = true, .asset = asset};
     for (const auto& [split, count] : summary.pictures) summary.total += count;
     if (!fs::exists(asset)) save_asset(BodyModel(), asset);
+    save_priors(options.out);
     return summary;
   }
   clear_unfinished(options.out);
   Run run(options);
   save_asset(run.model(), asset);
+  save_priors(options.out);
   WorldSummary summary = run.all();
   summary.asset = asset;
   write_json(options.out / "world.json", {{"options", options_of(options)}, {"pictures", summary.pictures}});

@@ -6,9 +6,10 @@ import subprocess
 import sys
 import unittest
 
-from support import PACKAGE, REPOSITORY, Folder, Shards
+from support import PACKAGE, REPOSITORY, Folder, Shards, needs
 
 
+@needs("cv2")
 class Example(Shards):
     def test_it_trains(self):
         script = PACKAGE / "examples" / "train.py"

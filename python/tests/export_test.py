@@ -9,11 +9,11 @@ import unittest
 
 import numpy as np
 
-from support import MISSING, PACKAGE, Shards, has, make_dataset
+from support import PACKAGE, Shards, make_dataset, needs
 from quadruped3d import Shard, load
 
 os.environ["HF_HUB_OFFLINE"] = "1"
-EXTRAS = ("pyarrow", "pandas", "datasets", "mlcroissant")
+EXTRAS = ("cv2", "pyarrow", "pandas", "datasets", "mlcroissant")
 OPEN = {"licence": "CC-BY-4.0", "source_url": "https://example.org/zoo", "citation": "A. Keeper (2020), \"Zoo | one\""}
 CLOSED = {"licence": "", "source_url": "", "citation": ""}
 
@@ -22,7 +22,7 @@ def files_of(folder):
     return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
 
 
-@unittest.skipUnless(has(*EXTRAS), f"one of {', '.join(EXTRAS)} {MISSING}")
+@needs(*EXTRAS)
 class Exports(Shards):
     def setUp(self):
         super().setUp()
@@ -106,7 +106,7 @@ class Exports(Shards):
         self.assertEqual(files_of(self.folder / "one"), files_of(self.folder / "two"))
 
 
-@unittest.skipUnless(has(*EXTRAS), f"one of {', '.join(EXTRAS)} {MISSING}")
+@needs(*EXTRAS)
 class Licences(Shards):
     def setUp(self):
         super().setUp()
@@ -134,7 +134,7 @@ class Licences(Shards):
         self.assertEqual(self.pictures(self.folder / "out"), [True] * 6)
 
 
-@unittest.skipUnless(has(*EXTRAS), f"one of {', '.join(EXTRAS)} {MISSING}")
+@needs(*EXTRAS)
 class Resuming(Shards):
     # Stops at a rename: the file is complete under its temporary name and not yet under its own.
     KILLED = """
@@ -204,7 +204,7 @@ class CommandLine(Shards):
         self.assertEqual(result.returncode, 2)
         self.assertIn("pip install 'quadruped3d[export]'", result.stderr)
 
-    @unittest.skipUnless(has(*EXTRAS), f"one of {', '.join(EXTRAS)} {MISSING}")
+    @needs(*EXTRAS)
     def test_summary_and_notes(self):
         dataset = make_dataset(self.folder / "made", [self.shards / "png.h5"], {"made/train": CLOSED})
         result = self.run_main("hf", dataset, "--out", self.folder / "out", "--json")

@@ -6,12 +6,12 @@ import unittest
 
 import numpy as np
 
-from support import MISSING, PACKAGE, Shards, has
+from support import PACKAGE, Shards, needs
 from quadruped3d import load
 
 
 class Table(Shards):
-    @unittest.skipUnless(has("pandas"), f"pandas {MISSING}")
+    @needs("pandas")
     def test_a_table_has_a_row_for_each_sample(self):
         table = load(self.shards / "jpeg.h5", table=True)
         self.assertEqual(len(table), 6)
@@ -23,7 +23,7 @@ class Table(Shards):
 
 
 class Types(unittest.TestCase):
-    @unittest.skipUnless(has("mypy"), f"mypy {MISSING}")
+    @needs("mypy")
     def test_mypy_has_no_complaint(self):
         result = subprocess.run([sys.executable, "-m", "mypy", "--strict"], cwd=PACKAGE, capture_output=True, text=True)
         self.assertEqual(result.returncode, 0, result.stdout + result.stderr)

@@ -5,6 +5,7 @@ them.
 """
 
 import hashlib
+import importlib.util
 import json
 import os
 import pathlib
@@ -23,17 +24,11 @@ import numpy as np  # noqa: E402
 
 from quadruped3d import body  # noqa: E402
 
-MISSING = "is not installed (tools/requirements-extra.txt)"  # ctest reports such tests as skipped
 
-
-def has(*modules):
-    """Whether all these packages can be imported."""
-    for module in modules:
-        try:
-            __import__(module)
-        except ImportError:
-            return False
-    return True
+def needs(*modules):
+    """Skips a test or a class of tests, and says so, where one of these packages is not installed."""
+    missing = [module for module in modules if importlib.util.find_spec(module) is None]
+    return unittest.skipIf(missing, f"not installed: {', '.join(missing)} (tools/requirements-extra.txt)")
 
 
 class Folder(unittest.TestCase):
@@ -121,12 +116,19 @@ def make_dataset(folder, shards, terms=None):
         "labels": {kind: kinds.count(kind) for kind in ("truth", "retained", "refined", "2d_only")},
         "thresholds": {"jpeg": {"tau_low": 0.03, "tau_high": 0.08, "delta": 0.05}},
         "statistics": {
+            "all": counts(len(kinds)), "reasons": {},
             "by_dataset": groups(lambda shard: [f"{name}/{split}" for name, split in
                                                 zip(shard.read("dataset"), shard.read("split"))]),
             "by_family": groups(lambda shard: [body.family_name(int(family)) for family in shard.read("family")]),
             "by_species": groups(lambda shard: shard.read("species")),
         },
-        "provenance": {"config": {"datasets": []}},
+        "provenance": {
+            "config": {"datasets": [{"name": name} for name in
+                                    sorted({str(name) for shard in opened for name in shard.read("dataset")})]},
+            "checkpoint_sha256": None, "smal_asset_sha256": None, "device": None,
+            "stage_keys": {"ingest": "i", "predict": "p", "fidelity": "f", "refine": "r", "measure": None, "shards": "s"},
+        },
+        "verdicts": {"file": "verdicts.csv", "sha256": ""},
         "shards": entries,
     }
     if terms is not None:

@@ -161,9 +161,9 @@ class EndToEnd(Case):
         self.scene.build("added", config=config)
         after = stamps(out.glob("stages/*/unit-*.h5"))
         self.assertEqual({p: after[p] for p in before}, before)
-        # One new unit in predict, refine and shards, and in crops where one of its pictures is kept.
+        # One new unit in every stage, and in crops where one of its pictures is kept.
         new = sorted(p.parent.name.split("-")[0] for p in set(after) - set(before))
-        self.assertEqual([stage for stage in new if stage != "crops"], ["predict", "refine", "shards"])
+        self.assertEqual([stage for stage in new if stage != "crops"], ["measure", "predict", "refine", "shards"])
         self.assertLessEqual(new.count("crops"), 1)
         run("verify", out)
 

@@ -108,6 +108,7 @@ class ImportTest(CheckpointCase):
         self.assertIn(f"{len(wanted)} of {len(wanted) + len(text)} tensors", out)
         self.assertIn(f"left out: {len(text)} of CLIP's text tower", out)
         self.assertEqual(metadata["imported_from"], "in.ckpt")
+        self.assertEqual(json.loads(metadata["prima_domain"])["pictures"], "photographs")
         config = json.loads(metadata["prima_config"])
         self.assertEqual({key: config[key] for key in TINY}, TINY)
         self.assertEqual([config[key] for key in ("heads", "clip_heads", "dec_heads")], [4, 4, 4])

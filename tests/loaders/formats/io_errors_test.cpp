@@ -107,11 +107,11 @@ TEST(UnreadableFolders, DoNotMakeAPictureMissing) {
   const testing::ScratchDir scratch;
   testing_files::write_picture(scratch.path() / "images/a.png");
   {
-    PictureFinder finder(scratch.path(), {}, {});
+    PictureFinder finder({.root = scratch.path()});
     const FailingIo io(Call::inspect, "/images/a.png", EACCES);
     expect_io_error([&] { finder.find("images/a.png"); }, scratch.path() / "images/a.png", EACCES);
   }
-  PictureFinder finder(scratch.path(), {}, {});
+  PictureFinder finder({.root = scratch.path()});
   EXPECT_EQ(finder.find("images/a.png").failure, Reason::none);
   EXPECT_EQ(finder.find("images/b.png").failure, Reason::image_missing);
   EXPECT_EQ(finder.find("images/" + std::string(300, 'b') + ".png").failure, Reason::image_missing);

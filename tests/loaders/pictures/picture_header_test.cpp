@@ -97,7 +97,9 @@ TEST(PictureHeader, damaged_files_are_refused) {
     const std::string whole = file_content(name);
     for (std::size_t size = 0; size < whole.size(); ++size) {
       const auto header = read_picture_header(as_bytes(whole.substr(0, size)));
-      if (header) EXPECT_EQ(header->width_px, 24);
+      if (header) {
+        EXPECT_EQ(header->width_px, 24);
+      }
       std::string damaged = whole;
       damaged[size] = static_cast<char>(damaged[size] ^ 0x5a);
       read_picture_header(as_bytes(damaged));

@@ -1,6 +1,7 @@
 // Writes shards and what the feed makes of them, for the tests of other readers (python/tests).
 //
-//   dump_feed shards FOLDER      writes png.h5, jpeg.h5 and single.h5, with samples with and without a body
+//   dump_feed shards FOLDER      writes png.h5, jpeg.h5 and single.h5, with samples with and without a body,
+//                                and body.h5, whose samples are as a build leaves them
 //   dump_feed batches REQUEST    writes the arrays of one batch into files of float32, and prints its draws
 //   as
 //                                JSON. REQUEST is a JSON file: sources (a list of lists of paths), weights,
@@ -17,6 +18,7 @@
 #include "manifests/json_file.h"
 #include "pipeline/feed/draw_sequence.h"
 #include "pipeline/feed/feed.h"
+#include "tests/pipeline/exports/body_samples.h"
 #include "tests/pipeline/feed/sample_shards.h"
 
 namespace q3d::pipeline::feed {
@@ -29,7 +31,7 @@ void write_jpeg_shard(const fs::path& path) {
   manifests::ShardHeader header;
   header.dataset = "jpeg";
   header.version = "v";
-  header.image_encoding = "jpeg";
+  header.image_encoding = manifests::ImageEncoding::jpeg;
   std::vector<manifests::ShardSample> samples;
   for (unsigned i = 0; i < 6; ++i) {
     manifests::ShardSample sample =
@@ -51,6 +53,7 @@ void write_shards(const fs::path& folder) {
   testing::write_sample_shard(folder / "png.h5", "png/train", 7, 10);
   testing::write_sample_shard(folder / "single.h5", "single/test", 1, 30);
   write_jpeg_shard(folder / "jpeg.h5");
+  testing::write_body_shard(folder / "body.h5", "a", 6, 1);
 }
 
 FeedOptions options_of(const json& request) {

@@ -1,0 +1,275 @@
+// Exports, read back by this program's own loaders.
+#include "pipeline/exports/export_dataset.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "filters/metrics.h"
+#include "loaders/formats/dataset.h"
+#include "loaders/pictures/image.h"
+#include "manifests/atomic_file.h"
+#include "pipeline/exports/corrections.h"
+#include "pipeline/exports/picture.h"
+#include "pipeline/run/errors.h"
+#include "pipeline/unit/annotated_body.h"
+#include "pipeline/unit/crop_keypoints.h"
+#include "tests/pipeline/exports/body_dataset.h"
+#include "tests/support/paths.h"
+
+namespace q3d::pipeline::exports {
+namespace {
+
+namespace fs = std::filesystem;
+using manifests::ShardSample;
+using nlohmann::json;
+using ::testing::HasSubstr;
+
+// A dataset of two shards with samples whose stored crops are whole and reduced in turn.
+class Exports : public ::testing::Test {
+ protected:
+  Exports() : made_(testing::make_body_dataset(scratch_.path(), "made", {"a", "b"}, 1)) {}
+
+  ExportSummary run(Format format, const std::string& out, bool pictures_anyway = false, int threads = 0) {
+    return export_dataset(made_.folder, {format, scratch_.path() / out, pictures_anyway, threads, true});
+  }
+
+  std::map<std::string, std::string> files(const std::string& out) const {
+    std::map<std::string, std::string> contents;
+    for (const auto& entry : fs::recursive_directory_iterator(scratch_.path() / out)) {
+      if (!entry.is_regular_file()) continue;
+      contents[fs::relative(entry.path(), scratch_.path() / out).string()] =
+          manifests::read_file(entry.path());
+    }
+    return contents;
+  }
+
+  testing::ScratchDir scratch_;
+  testing::BodyDataset made_;
+  const std::vector<ShardSample>& samples_ = made_.samples;
+};
+
+TEST_F(Exports, PrimaIsLoadedAgainWithEqualErrors) {
+  const ExportSummary summary = run(Format::prima, "prima");
+  EXPECT_EQ(summary.samples, 8);
+  EXPECT_EQ(summary.pictures, 8);
+  loaders::formats::DatasetOptions options;
+  options.name = "again";
+  options.format = "prima";
+  options.root = scratch_.path() / "prima/zoo";
+  options.annotations = "train.json";
+  const auto loaded = loaders::formats::load_dataset(options);
+  ASSERT_EQ(loaded.records.size(), samples_.size());
+  for (std::size_t i = 0; i < samples_.size(); ++i) {
+    const manifests::SampleRecord& record = loaded.records[i];
+    const ShardSample& sample = samples_[i];
+    ASSERT_EQ(record.failure, manifests::Reason::none) << record.failure_detail;
+    ASSERT_TRUE(record.truth.has_value());
+    EXPECT_EQ(record.species, sample.record.species);
+    EXPECT_EQ(record.family, sample.record.family);
+    EXPECT_EQ(record.truth->betas, sample.body.betas);
+    EXPECT_EQ(record.truth->keypoints_3d, sample.keypoints_3d);
+    EXPECT_EQ(record.mask_path.empty(), false);
+    const auto body = unit::annotated_body(*record.truth);
+    for (std::size_t n = 0; n < sample.body.pose.size(); ++n) {
+      EXPECT_NEAR(body.pose[n], sample.body.pose[n], 1e-6);
+    }
+    const auto error = filters::projection_error(body.keypoints_2d, unit::crop_keypoints(record));
+    ASSERT_TRUE(error.has_value());
+    EXPECT_NEAR(*error, sample.judgement.final_error, 1e-6) << record.id;
+  }
+}
+
+// The keypoints lie on the same pixels: what a red channel that rises with x says about a keypoint's place
+// in the source is what it says in the exported picture.
+TEST_F(Exports, ThePictureShiftsWithItsNumbers) {
+  int shifted = 0;
+  for (const ShardSample& sample : samples_) {
+    const ExportedPicture stored =
+        export_picture(sample, manifests::ImageEncoding::jpeg, Pictures::as_stored);
+    const ExportedPicture official =
+        export_picture(sample, manifests::ImageEncoding::jpeg, Pictures::official);
+    EXPECT_EQ(stored.bytes, sample.crop);
+    if (sample.crop_from_image[0] == 1.0) {
+      EXPECT_EQ(official.bytes, sample.crop);
+      continue;
+    }
+    ++shifted;
+    const double shift = official.from_image[2] - stored.from_image[2];
+    EXPECT_GT(std::abs(shift), 0.0);
+    EXPECT_LE(std::abs(shift), 0.5);
+    const cv::Mat before = loaders::pictures::decode_image(stored.bytes).rgb;
+    const cv::Mat after = loaders::pictures::decode_image(official.bytes).rgb;
+    const int middle = before.rows / 2;  // the picture's red channel is 255 x / 320 there
+    const double slope =
+        (before.at<cv::Vec3b>(middle, middle + 60)[0] - before.at<cv::Vec3b>(middle, middle - 60)[0]) / 120.0;
+    double change = 0.0;
+    for (int x = middle - 60; x < middle + 60; ++x) {
+      change += after.at<cv::Vec3b>(middle, x)[0] - before.at<cv::Vec3b>(middle, x)[0];
+    }
+    EXPECT_NEAR(change / 120.0, -slope * shift, 0.15);
+  }
+  EXPECT_EQ(shifted, 4);
+}
+
+TEST_F(Exports, EqualBytesForAnyThreadsAndAfterAnInterruption) {
+  run(Format::prima, "one", false, 1);
+  run(Format::prima, "four", false, 4);
+  const auto whole = files("one");
+  EXPECT_EQ(files("four"), whole);
+  EXPECT_EQ(whole.count("export.json"), 1U);
+  // What a run leaves that was killed in the second unit: the first one's part, and no manifest.
+  fs::rename(made_.folder / "shards/000001.h5", made_.folder / "away.h5");
+  EXPECT_THROW(run(Format::prima, "stopped"), std::exception);
+  EXPECT_EQ(files("stopped").count("export.json"), 0U);
+  fs::rename(made_.folder / "away.h5", made_.folder / "shards/000001.h5");
+  EXPECT_FALSE(run(Format::prima, "stopped").was_complete);
+  EXPECT_EQ(files("stopped"), whole);
+  EXPECT_TRUE(run(Format::prima, "stopped").was_complete);
+  EXPECT_EQ(files("stopped"), whole);
+}
+
+TEST_F(Exports, OtherFoldersAndDamageAreRefused) {
+  run(Format::coco, "coco");
+  EXPECT_THROW(run(Format::prima, "coco"), run::ConfigError);
+  EXPECT_THROW(run(Format::coco, "coco", true), run::ConfigError);
+  fs::create_directories(scratch_.path() / "mine");
+  std::ofstream(scratch_.path() / "mine/thesis.txt") << "years of work";
+  EXPECT_THROW(run(Format::coco, "mine"), run::ConfigError);
+  EXPECT_TRUE(fs::exists(scratch_.path() / "mine/thesis.txt"));
+  std::ofstream(scratch_.path() / "coco/annotations.json") << "{}";
+  EXPECT_THROW(run(Format::coco, "coco"), std::runtime_error);
+}
+
+TEST_F(Exports, PicturesNeedAStatedLicence) {
+  made_.document["datasets"]["zoo/train"]["licence"] = "";
+  made_.write_document();
+  const ExportSummary summary = run(Format::prima, "prima");
+  EXPECT_EQ(summary.pictures, 0);
+  EXPECT_EQ(summary.without_licence, std::vector<std::string>{"zoo/train"});
+  for (const auto& [name, content] : files("prima")) EXPECT_THAT(name, HasSubstr(".json"));
+  const json data = json::parse(files("prima").at("zoo/train.json")).at("data");
+  EXPECT_EQ(data[1].at("img_path"), samples_[1].record.image_ref);
+  EXPECT_EQ(data[1].at("bbox")[0], samples_[1].record.box.x_px);
+  EXPECT_FALSE(data[1].contains("mask_path"));
+  EXPECT_EQ(run(Format::prima, "anyway", true).pictures, 8);
+}
+
+class Corrections : public Exports {
+ protected:
+  Corrections() {
+    run(Format::coco, "coco");
+    coco_ = json::parse(files("coco").at("annotations.json"));
+  }
+  CocoChanges changes(const json& corrected) {
+    const fs::path file = scratch_.path() / "corrected.json";
+    manifests::write_file_atomically(file, corrected.dump());
+    return coco_changes(scratch_.path() / "coco", file);
+  }
+  json coco_;
+};
+
+TEST_F(Corrections, AnUnchangedFileChangesNothing) {
+  json same = coco_;
+  for (json& annotation : same["annotations"]) {  // as tools that keep two decimals write it
+    annotation.erase("attributes");
+    for (json& number : annotation["keypoints"]) number = std::round(number.get<double>() * 100.0) / 100.0;
+  }
+  const CocoChanges none = changes(same);
+  EXPECT_EQ(none.pictures, 8U);
+  EXPECT_TRUE(none.points.empty());
+  EXPECT_TRUE(none.vetoes.empty());
+}
+
+TEST_F(Corrections, MovedPointsComeBackInTheSourcePicture) {
+  json moved = coco_;
+  for (json& image : moved["images"]) image["id"] = image["id"].get<int>() + 500;  // tools renumber
+  for (json& annotation : moved["annotations"])
+    annotation["image_id"] = annotation["image_id"].get<int>() + 500;
+  json& keypoints = moved["annotations"][1]["keypoints"];  // of a reduced crop
+  const double factor = samples_[1].crop_from_image[0];
+  ASSERT_LT(factor, 1.0);
+  keypoints[0] = keypoints[0].get<double>() + 3.0 * factor;  // point 0: three source pixels to the right
+  keypoints[3 * 4] = 100.0;                                  // point 4 was not labelled
+  keypoints[3 * 4 + 1] = 90.0;
+  keypoints[3 * 4 + 2] = 2;
+  keypoints[3 * 2 + 2] = 0;  // point 2 goes
+  const CocoChanges found = changes(moved);
+  ASSERT_EQ(found.points.size(), 1U);
+  const auto& points = found.points.at(samples_[1].record.id);
+  ASSERT_EQ(points.size(), 3U);
+  EXPECT_EQ(points[0].keypoint, 0U);
+  EXPECT_NEAR(points[0].x_px, samples_[1].record.keypoints[0].x_px + 3.0, 1e-9);
+  EXPECT_NEAR(points[0].y_px, samples_[1].record.keypoints[0].y_px, 1e-9);
+  EXPECT_EQ(points[1].keypoint, 2U);
+  EXPECT_EQ(points[1].v, 0);
+  EXPECT_EQ(points[2].keypoint, 4U);
+  EXPECT_NEAR(points[2].x_px, (100.0 - samples_[1].crop_from_image[2]) / factor, 1e-9);
+  EXPECT_EQ(points[2].v, 2);
+}
+
+TEST_F(Corrections, RemovedAndMarkedAnnotationsAreVetoesAndUnlistedPicturesStay) {
+  json changed = coco_;
+  changed["annotations"].erase(2);                           // listed without an annotation
+  changed["annotations"][4]["attributes"]["veto"] = "true";  // of image 5, as CVAT writes a checkbox
+  changed["images"].erase(7);                                // not listed
+  changed["annotations"].erase(6);
+  const CocoChanges found = changes(changed);
+  EXPECT_EQ(found.pictures, 7U);
+  EXPECT_EQ(found.vetoes.size(), 2U);
+  EXPECT_EQ(found.vetoes.count(samples_[2].record.id), 1U);
+  EXPECT_EQ(found.vetoes.count(samples_[5].record.id), 1U);
+  EXPECT_TRUE(found.points.empty());
+}
+
+TEST_F(Corrections, TheFilesAreReadByTheBuild) {
+  json moved = coco_;
+  moved["annotations"][0]["keypoints"][1] = 17.25;
+  moved["annotations"].erase(3);
+  const CocoChanges found = changes(moved);
+  write_changes(found, scratch_.path() / "changes");
+  auto read = candidates::read_corrections(scratch_.path() / "changes/corrections.tsv");
+  const std::string& id = samples_[0].record.id;
+  ASSERT_EQ(read.points.size(), 1U);
+  EXPECT_EQ(read.points.at(id)[0].y_px, found.points.at(id)[0].y_px);  // to the last bit
+  std::vector<manifests::SampleRecord> records{samples_[0].record, samples_[1].record};
+  candidates::apply_corrections(read, records);
+  EXPECT_EQ(read.matched, 1U);
+  EXPECT_EQ(records[0].keypoints[0].y_px, found.points.at(id)[0].y_px);
+  EXPECT_EQ(records[0].keypoints[1].x_px, samples_[0].record.keypoints[1].x_px);
+  EXPECT_EQ(records[1].keypoints[0].y_px, samples_[1].record.keypoints[0].y_px);
+}
+
+TEST_F(Corrections, WhatCannotBeMatchedIsTold) {
+  json other = coco_;
+  other["images"][0]["file_name"] = "unknown.jpg";
+  EXPECT_THROW(changes(other), std::runtime_error);
+  other = coco_;
+  other["annotations"].push_back(other["annotations"][0]);
+  EXPECT_THROW(changes(other), std::runtime_error);
+  other = coco_;
+  other["categories"][0]["keypoints"][0] = "left_horn";
+  EXPECT_THROW(changes(other), std::runtime_error);
+  other = coco_;
+  other["annotations"][0]["keypoints"][2] = 0.7;
+  EXPECT_THROW(changes(other), std::runtime_error);
+}
+
+TEST(CorrectionsFile, LinesThatAreNoPointsAreTold) {
+  const testing::ScratchDir scratch;
+  const fs::path file = scratch.path() / "corrections.tsv";
+  for (const char* line :
+       {"zoo/train/a.jpg#0\tleft_eye\t1\t2", "zoo/train/a.jpg#0\tleft_horn\t1\t2\t2",
+        "zoo/train/a.jpg#0\tleft_eye\tone\t2\t2", "zoo/train/a.jpg#0\tleft_eye\t1\t2\t3"}) {
+    manifests::write_file_atomically(file, std::string(line) + "\n");
+    EXPECT_THROW(candidates::read_corrections(file), run::ConfigError) << line;
+  }
+  EXPECT_THROW(candidates::read_corrections(scratch.path() / "absent.tsv"), run::ConfigError);
+}
+
+}  // namespace
+}  // namespace q3d::pipeline::exports
