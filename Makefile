@@ -16,7 +16,7 @@ FUZZ_TARGETS ?=
 quadruped3d: program  ## build the dataset that CONFIG describes (default: the rendered sample world)
 	tools/quadruped3d.sh $(OUT) $(CONFIG)
 
-sample-model: program  ## train the default network further on the rendered world
+sample-model: program  ## train the default network on the rendered world (pre-training and Stage 1)
 	tools/sample_loop.sh model
 
 sample-loop: program  ## Stage 1, Stage 2, Stage 3 and their tables (SCHEDULE=full or quick, SEED=0)

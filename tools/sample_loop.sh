@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The paper's three stages on the rendered world, from a stem that knows photographs (models/README.md):
-#   tools/sample_loop.sh model             the network that ships learns on; with another stem, it gets this one first
+# The paper's three stages on the rendered world, from nothing:
+#   tools/sample_loop.sh model             pools, pre-trained encoders, Stage 1 (full schedule): models/small.safetensors
 #   tools/sample_loop.sh loop SCHEDULE SEED   Stage 1, Stage 2, Stage 3, and both networks on the test sets
 # SCHEDULE is full or quick. Every step does what is missing, so a run that was stopped goes on where it was.
 set -euo pipefail
@@ -30,31 +30,10 @@ prepare() {
     "$program" build --config "configs/world_pools/$pool.json" --out "$home/pools/$pool"
   done
   [ -f "$home/initial.safetensors" ] && [ -f "$home/priors.safetensors" ] ||
-    "$program" init --size lite --stem models/efficientnet_lite0.safetensors --out "$home/initial.safetensors" \
-      --priors "$home/priors.safetensors" --smal-asset data/world/assets/smal_synthetic.safetensors
-}
-
-pretrain() {
+    "$program" init --size small --out "$home/initial.safetensors" --priors "$home/priors.safetensors" \
+      --smal-asset data/world/assets/smal_synthetic.safetensors
   say "pre-training of the image encoders, shared by all stages"
   train --config configs/world_training.json --stage pretrain --out "$home/pretrain"
-}
-
-# What ships may have another stem than an untrained network has today; then its encoders have to learn anew to place
-# keypoints. The digest in the folder's name keeps runs from different starts apart.
-model() {
-  local shipped=models/small.safetensors
-  local run stage=further
-  run=$home/further-$(sha256sum "$shipped" | cut -c 1-12)
-  mkdir -p "$run"
-  grep -aq backbone.patch_embed.efficientnet "$shipped" || stage=graft
-  [ -f "$run/initial.safetensors" ] ||
-    .venv/bin/python tools/graft.py "$home/initial.safetensors" "$shipped" "$run/initial.safetensors"
-  printf '{ "network": { "initial": "initial.safetensors" } }\n' >"$run/run.json"
-  say "the network that ships learns on"
-  train --config configs/world_training.json --config configs/world_training_further.json --config "$run/run.json" \
-    --stage "$stage" --out "$run/trained"
-  evaluate "$run/trained" "$run/evaluation"
-  say "trained: $run/trained/model.safetensors"
 }
 
 # The training config's layers for a schedule and a seed; Stage 3 reads what this loop's Stage 2 made.
@@ -111,11 +90,11 @@ loop() {
 case "${1:-}" in
   model)
     prepare
-    model
+    stage1 full 0 "$home/full-0"
+    say "trained: $home/full-0/stage1/model.safetensors (models/small.safetensors ships such a network)"
     ;;
   loop)
     prepare
-    pretrain
     loop "${2:-full}" "${3:-0}"
     ;;
   *)

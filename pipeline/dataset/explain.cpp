@@ -171,7 +171,7 @@ ordered_json explain(const fs::path& given, const std::string& id) {
   const VerdictRow row = dataset.verdict(id);
   const Evidence evidence = gather(dataset, row);
   const auto thresholds = thresholds_of(dataset.manifest(), row.dataset);
-  ordered_json story = {{"id", id}, {"dataset", dataset.version_name()}};
+  ordered_json story = {{"id", row.id}, {"dataset", dataset.version_name()}};
   story["verdict"] = describe_verdict(row);
   story["thresholds"] = describe_thresholds(thresholds);
   story["why"] = why(row.judgement, dataset.role(row), thresholds);

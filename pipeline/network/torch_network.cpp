@@ -72,7 +72,9 @@ torch::Tensor stack_patches(std::span<const device::PatchView> patches) {
   return batch.permute({0, 3, 1, 2}).contiguous();
 }
 
-model::DeviceChoice choose_device(const std::string& name) {
+// The description of the device counts the threads, so they are set first.
+model::DeviceChoice choose_device(const std::string& name, int threads) {
+  model::configure_compute(threads);
   try {
     return model::choose_device(name);
   } catch (const std::invalid_argument& error) {
@@ -97,7 +99,7 @@ class TorchNetwork : public device::Network {
         predict_batch_(static_cast<std::size_t>(network.batch)),
         adapt_batch_(static_cast<std::size_t>(tta.batch)),
         options_(tta_options(tta)),
-        device_(choose_device(network.device)),
+        device_(choose_device(network.device, threads_)),
         prima_(model::Prima::load(
             network.checkpoint, network.smal_asset, device_.device,
             network.dtype == config::Dtype::bfloat16 ? torch::kBFloat16 : torch::kFloat32)) {}
@@ -187,7 +189,7 @@ int compute_threads(const config::NetworkConfig& network) {
 }
 
 std::string device_key(const config::NetworkConfig& network) {
-  const bool on_cpu = choose_device(network.device).device.is_cpu();
+  const bool on_cpu = choose_device(network.device, compute_threads(network)).device.is_cpu();
   return on_cpu ? fmt::format("cpu-{}", compute_threads(network)) : "cuda";
 }
 

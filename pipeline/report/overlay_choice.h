@@ -19,12 +19,12 @@ enum class Order : std::uint8_t {
 };
 
 struct Choice {
-  std::vector<std::string> ids;  // ids or parts of ids; empty takes all candidates
+  std::vector<std::string> ids{};  // ids or parts of ids; empty takes all candidates
   // Filters; an empty one lets all pass.
-  std::vector<std::string> species;
-  std::vector<std::string> families;
-  std::vector<std::string> datasets;
-  std::vector<std::string> verdicts;  // names of verdicts, or of reasons
+  std::vector<std::string> species{};
+  std::vector<std::string> families{};
+  std::vector<std::string> datasets{};
+  std::vector<std::string> verdicts{};  // names of verdicts, or of reasons
   Order order = Order::spread;
   std::size_t count = 12;  // at most; with ids and Order::spread, of each part of an id
 };

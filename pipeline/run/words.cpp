@@ -34,7 +34,9 @@ std::string nearest_word(std::string_view word, const std::vector<std::string>& 
 std::string suggestion(std::string_view word, const std::vector<std::string>& candidates) {
   constexpr std::size_t kLeastBeginning = 3;
   std::string meant = nearest_word(word, candidates);
-  if (!is_misspelling(word, meant)) {
+  // Two exchanged letters are two edits, and commands are short: half of the letters may differ.
+  const bool is_near = 2 * edit_distance(word, meant) <= std::max(word.size(), meant.size());
+  if (!is_near || meant.empty()) {
     const auto longer = std::find_if(candidates.begin(), candidates.end(), [&](const std::string& candidate) {
       return word.size() >= kLeastBeginning && std::string_view(candidate).substr(0, word.size()) == word;
     });

@@ -114,7 +114,8 @@ class Refusals(Shards):
         path = self.folder / "reference.h5"
         path.write_bytes((self.shards / "png.h5").read_bytes())
         with h5py.File(path, "r+") as file:
-            file.attrs.modify("image_encoding", np.bytes_("reference"))
+            del file.attrs["image_encoding"]  # a new value of another length
+            file.attrs["image_encoding"] = np.bytes_("reference")
         with self.assertRaisesRegex(ShardError, "reference.h5: a shard without pictures"):
             Dataset(path)
 

@@ -11,7 +11,7 @@ import unittest
 import numpy as np
 from PIL import Image
 
-from support import PACKAGE, Shards, make_dataset, needs
+from support import PACKAGE, Shards, check_issues, make_dataset, needs
 from quadruped3d import KEYPOINTS, Shard, body, geometry, load
 
 TERMS = {"zoo/train": {"licence": "CC-BY-4.0", "source_url": "https://example.org/zoo", "citation": "A zoo"}}
@@ -169,8 +169,7 @@ def check_croissant(case, folder, record_set, field, expected):
 
     with contextlib.chdir(folder):
         dataset = mlcroissant.Dataset(jsonld="croissant.json")
-        issues = dataset.metadata.ctx.issues
-        case.assertEqual((set(issues.errors), set(issues.warnings)), (set(), set()))
+        check_issues(case, dataset)
         case.assertEqual(dataset.metadata.conforms_to.value, "http://mlcommons.org/croissant/1.1")
         records = list(dataset.records(record_set))
     case.assertEqual([record[f"{record_set}/{field}"] for record in records], expected)

@@ -83,6 +83,13 @@ def read_safetensors(path):
             for name, entry in json.loads(content[8:8 + length]).items() if name != "__metadata__"}
 
 
+def check_issues(case, croissant):
+    """No error and no warning of mlcroissant, but that a date is missing: equal exports have equal bytes."""
+    issues = croissant.metadata.ctx.issues
+    case.assertEqual(set(issues.errors), set())
+    case.assertEqual([text for text in issues.warnings if "datePublished" not in text], [])
+
+
 def make_dataset(folder, shards, terms=None):
     """A dataset's folder of copies of shards, with a dataset.json that counts them as `build` does.
 

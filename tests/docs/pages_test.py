@@ -52,7 +52,7 @@ class BodyPage(unittest.TestCase):
         section = page.split("\n### The order of the 26 keypoints\n")[1].split("\n## ")[0]
         rows = [[cell.strip(" `") for cell in line.strip("|").split("|")]
                 for line in section.splitlines() if line.startswith("|")][2:]
-        listed = {int(row[at]): row[at + 1] for row in rows for at in (0, 2)}
+        listed = {int(row[0]): row[1] for row in rows}
         vertices = json.loads((ROOT / "tools" / "keypoint_vertices.json").read_text())["keypoints"]
         self.assertEqual(listed, {i: group["name"] for i, group in enumerate(vertices)})
 

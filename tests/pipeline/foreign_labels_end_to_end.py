@@ -135,7 +135,7 @@ class ForeignLabels(Case):
         slp.frame(0, [{"points": animal(20, 40)}])
         slp.frame(1, [{"points": animal(30, 40)}])
         slp.write(self.folder / "clip.slp")
-        points = {sample["image_ref"] if "image_ref" in sample else name: sample
+        points = {sample["image_ref"].decode() if "image_ref" in sample else name: sample
                   for name, sample in self.build("clip.slp").items()}
         self.assertEqual(len(points), 2)
         by_nose = {float(sample["keypoints_px"][24][0]): name for name, sample in points.items()}

@@ -324,7 +324,7 @@ class Sizes(IntakeCase):
         self.write("labels.json", document)
         sample, = self.build("--quiet")
         self.assertEqual([reason for reason, _ in self.failures()], [
-            "not_in_pixels", "keypoints_outside", "no_visible_keypoints", "not_in_pixels", "box_too_small"])
+            "not_in_pixels", "box_outside_image", "no_visible_keypoints", "not_in_pixels", "box_too_small"])
         self.assertIn("between 0 and 1", self.failures()[0][1])
         self.assertEqual((sample["keypoints_weight"][24], sample["keypoints_weight"][0]), (0, 0))
         self.assert_noted("where tools put points that nobody set, get weight 0: 2 records")

@@ -32,7 +32,7 @@ struct Photographs {
 
 json megadetector(const json& detections) {
   return {{"detection_categories", {{"1", "animal"}, {"2", "person"}, {"3", "vehicle"}}},
-          {"images", {{{"file", "horse_11361_0.png"}, {"detections", detections}}}}};
+          {"images", {{{"file", "images/horse_11361_0.png"}, {"detections", detections}}}}};
 }
 
 void expect_box(const SampleRecord& sample, double x, double y, double w, double h) {
@@ -69,7 +69,7 @@ TEST(Photographs, MegadetectorsBoxesAreSharesOfThePicture) {
       photographs.load(megadetector({{{"category", "1"}, {"conf", 0.9}, {"bbox", {0.25, 0.5, 0.5, 0.25}}}}));
   ASSERT_EQ(dataset.records.size(), 1U);
   expect_box(dataset.records[0], 16, 24, 32, 12);
-  EXPECT_EQ(dataset.records[0].id, "set/train/horse_11361_0.png#0");
+  EXPECT_EQ(dataset.records[0].id, "set/train/images/horse_11361_0.png#0");
 }
 
 TEST(Photographs, PeopleAndUnsureBoxesAreLeftOutAndCounted) {
@@ -79,7 +79,7 @@ TEST(Photographs, PeopleAndUnsureBoxesAreLeftOutAndCounted) {
                                      {{"category", "1"}, {"conf", 0.1}, {"bbox", {0.1, 0.1, 0.5, 0.5}}},
                                      {{"category", "1"}, {"conf", 0.3}, {"bbox", {0.1, 0.1, 0.5, 0.5}}}}));
   ASSERT_EQ(dataset.records.size(), 1U);
-  EXPECT_EQ(dataset.records[0].id, "set/train/horse_11361_0.png#2");
+  EXPECT_EQ(dataset.records[0].id, "set/train/images/horse_11361_0.png#2");
   ASSERT_EQ(dataset.notes.size(), 2U);
   EXPECT_THAT(dataset.notes[0].text, HasSubstr("below min_confidence (0.2)"));
   EXPECT_THAT(dataset.notes[1].text, HasSubstr("people and vehicles"));
@@ -96,11 +96,12 @@ TEST(Photographs, PixelsInAMegadetectorFileFail) {
 
 TEST(Photographs, BoxesOfACocoFile) {
   Photographs photographs;
-  const Dataset dataset = photographs.load({{"images", {{{"id", "a"}, {"file_name", "horse_11361_0.png"}}}},
-                                            {"annotations",
-                                             {{{"image_id", "a"}, {"bbox", {8, 9, 30, 20}}, {"score", 0.8}},
-                                              {{"image_id", "a"}, {"bbox", {8, 9, 30, 20}}, {"score", 0.1}},
-                                              {{"image_id", "b"}, {"bbox", {8, 9, 30, 20}}}}}});
+  const Dataset dataset =
+      photographs.load({{"images", {{{"id", "a"}, {"file_name", "images/horse_11361_0.png"}}}},
+                        {"annotations",
+                         {{{"image_id", "a"}, {"bbox", {8, 9, 30, 20}}, {"score", 0.8}},
+                          {{"image_id", "a"}, {"bbox", {8, 9, 30, 20}}, {"score", 0.1}},
+                          {{"image_id", "b"}, {"bbox", {8, 9, 30, 20}}}}}});
   ASSERT_EQ(dataset.records.size(), 2U);
   expect_box(dataset.records[0], 8, 9, 30, 20);
   EXPECT_EQ(dataset.records[1].failure, Reason::image_not_listed);

@@ -326,7 +326,8 @@ TEST(BuildConfig, TheShippedConfigsOfTheWorldAreSound) {
   EXPECT_EQ(strict.profile, "strict");
   EXPECT_EQ(strict.guards.held_out_share, 0.0);  // it shortens adaptation, which makes labels worse
   EXPECT_GT(strict.guards.pose_deviation_max, 0.0);
-  EXPECT_EQ(strict.guards.priors.parent_path(), std::filesystem::weakly_canonical(configs / "../data/loop"));
+  EXPECT_EQ(strict.guards.priors.parent_path(),
+            std::filesystem::weakly_canonical(configs / "../data/world/assets"));
 }
 
 TEST(BuildConfig, TwoDatasetsOfOneNameAndSplitAreRefused) {
@@ -432,7 +433,12 @@ TEST(Profiles, PaperIsTheRuleAloneAndTheDefault) {
   config.erase("guards");
   const BuildConfig paper = parse_build_config(config, "t");
   EXPECT_EQ(paper.profile, "paper");
-  EXPECT_FALSE(judging_rules(paper).measures_labels());
+  EXPECT_EQ(paper.guards.visible_min, 0);
+  EXPECT_EQ(paper.guards.pose_deviation_max, 0.0);
+  EXPECT_EQ(paper.guards.limb_factor_max, 0.0);
+  EXPECT_EQ(paper.guards.left_right_max, 0.0);
+  EXPECT_EQ(paper.guards.mask_iou_min, 0.0);
+  EXPECT_EQ(judging_rules(paper).min_trust, 0.0);
   EXPECT_EQ(paper.guards.iterations_full_at, 0);
   EXPECT_EQ(paper.guards.held_out_share, 0.0);
   config["profile"] = "paper";

@@ -53,7 +53,7 @@ def write_config(shared, path, **changes):
     network = {"checkpoint": str(shared / "tiny.safetensors"), "smal_asset": str(world_body(shared / "world")),
                "device": "cpu", "compute_threads": 1}
     if "filter" in changes:
-        changes["filter"] = {"tau_ceiling": 1.0, **changes["filter"]}
+        changes["filter"] = {"tau_ceiling": 100.0, **changes["filter"]}
     return write_json(path, {"network": network, "tta": {"learning_rate": 1e-3}, **changes})
 
 

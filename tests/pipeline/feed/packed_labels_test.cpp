@@ -94,7 +94,7 @@ fs::path* PackedLabels::folder_ = nullptr;
 std::vector<double> distances(const Pool& pool) {
   std::vector<double> result;
   for (std::size_t slot = 0; slot < pool.drawn.size(); ++slot) {
-    const auto& trans = pool.drawn[slot]->trans;
+    const auto& trans = pool.drawn[slot]->body.translation;
     for (std::size_t k = 0; k < kKeypoints; ++k) {
       const float* annotated = &pool.batch.keypoints_2d[(slot * kKeypoints + k) * 3];
       const float* body = &pool.batch.keypoints_3d[(slot * kKeypoints + k) * 4];

@@ -69,7 +69,7 @@ TEST(Groups, HaveCountsSharesAndYields) {
   EXPECT_NEAR(lion["share_after"].get<double>(), 2.0 / 3.0, 1e-5);
   EXPECT_DOUBLE_EQ(lion["mean_error_before"].get<double>(), 0.04);
   EXPECT_DOUBLE_EQ(lion["mean_error_after"].get<double>(), 0.03);
-  EXPECT_EQ(all["species"].back()["name"], "unknown") << "of equal size, by name";
+  EXPECT_EQ(all["species"].back()["name"], "wolf") << "of equal size, by name";
 }
 
 TEST(Groups, TheImbalanceLeavesOutUnknownsAndCountsTheLost) {

@@ -205,7 +205,7 @@ TEST(DecidingValues, HoldWhatDecidesTheWeights) {
                                                           {"/weight_decay", 0.2},
                                                           {"/largest_gradient_norm", 2},
                                                           {"/model_dtype", "float16"},
-                                                          {"/seed", 12},
+                                                          {"/seed", 12U},
                                                           {"/network/precision", "auto"},
                                                           {"/network/without", {"bio_features"}},
                                                           {"/pools/ctrlani3d/weight", 0.6},
