@@ -9,9 +9,7 @@
 #include <sstream>
 
 #include "loaders/keypoints/topology.h"
-#include "manifests/atomic_file.h"
-#include "manifests/digest.h"
-#include "manifests/file_descriptor.h"
+#include "pipeline/candidates/list_file.h"
 #include "pipeline/run/errors.h"
 
 namespace q3d::pipeline::candidates {
@@ -20,15 +18,6 @@ namespace {
 using manifests::Reason;
 
 constexpr std::size_t kCells = 5;
-
-std::string read_text(const std::filesystem::path& file) {
-  try {
-    return manifests::read_file(file);
-  } catch (const manifests::IoError& error) {
-    if (!error.names_no_file()) throw;
-    throw run::ConfigError(fmt::format("corrections: {}", error.what()));
-  }
-}
 
 std::vector<std::string> cells_of(const std::string& line) {
   std::vector<std::string> cells;
@@ -73,21 +62,16 @@ void correct(const std::vector<CorrectedPoint>& points, manifests::SampleRecord&
 }  // namespace
 
 Corrections read_corrections(const std::filesystem::path& file) {
-  const std::string text = read_text(file);
+  const ListFile list = read_list_file(file, "corrections");
   Corrections corrections;
-  corrections.sha256 = manifests::sha256(text);
-  std::istringstream lines(text);
-  std::string line;
-  for (int number = 1; std::getline(lines, line); ++number) {
-    if (line.ends_with('\r')) line.pop_back();
-    if (line.empty() || line.starts_with('#')) continue;
+  corrections.sha256 = list.sha256;
+  for (const auto& [number, line] : list.lines) {
     const std::vector<std::string> cells = cells_of(line);
     CorrectedPoint point;
     if (!read_point(cells, point)) {
       throw run::ConfigError(
           fmt::format("{}: line {}: got \"{}\", expected a sample id, the name of a keypoint, x and y in "
-                      "pixels, and v (0, 1 "
-                      "or 2), with tabs between them",
+                      "pixels, and v (0, 1 or 2), with tabs between them",
                       file.string(), number, line));
     }
     corrections.points[cells[0]].push_back(point);

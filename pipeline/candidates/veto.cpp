@@ -3,36 +3,17 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <sstream>
 
-#include "manifests/atomic_file.h"
-#include "manifests/digest.h"
-#include "manifests/file_descriptor.h"
+#include "pipeline/candidates/list_file.h"
 #include "pipeline/run/errors.h"
 
 namespace q3d::pipeline::candidates {
-namespace {
-
-std::string read_text(const std::filesystem::path& file) {
-  try {
-    return manifests::read_file(file);
-  } catch (const manifests::IoError& error) {
-    if (!error.names_no_file()) throw;
-    throw run::ConfigError(fmt::format("veto: {}", error.what()));
-  }
-}
-
-}  // namespace
 
 Veto read_veto(const std::filesystem::path& file) {
-  const std::string text = read_text(file);
+  const ListFile list = read_list_file(file, "veto");
   Veto veto;
-  veto.sha256 = manifests::sha256(text);
-  std::istringstream lines(text);
-  std::string line;
-  for (int number = 1; std::getline(lines, line); ++number) {
-    if (line.ends_with('\r')) line.pop_back();
-    if (line.empty() || line.starts_with('#')) continue;
+  veto.sha256 = list.sha256;
+  for (const auto& [number, line] : list.lines) {
     const std::size_t tab = line.find('\t');
     const std::string id = line.substr(0, tab);
     // dataset/split/image#annotation
