@@ -49,7 +49,7 @@ const Prima& network(const Setting& setting) {
 }
 
 torch::Tensor crops(std::int64_t batch) {
-  torch::manual_seed(1);
+  at::manual_seed(1);
   return torch::randint(0, 256, {batch, 3, 256, 256}, torch::kUInt8);
 }
 

@@ -59,7 +59,7 @@ function(q3d_install_package)
     # dpkg-shlibdeps does not know LibTorch, which is no Debian package.
     set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS OFF)
     set(CPACK_DEBIAN_PACKAGE_DEPENDS
-        "libembree3-3, libhdf5-103-1, libicu72, libjpeg62-turbo, libopencv-core406, libopencv-imgcodecs406, libopencv-imgproc406, libssl3, libtbb12, zlib1g")
+        "libembree3-3, libfmt9, libhdf5-103-1, libicu72, libjpeg62-turbo, libopencv-core406, libopencv-imgcodecs406, libopencv-imgproc406, libssl3, libtbb12, zlib1g")
     include(CPack)
   endif()
 endfunction()

@@ -1,29 +1,43 @@
 # The shared compile options, the precompiled LibTorch header and the helpers that declare our targets.
 
-# fmt is used header-only: LibTorch's wheel ships its own copy, which is found first in sources that include
-# LibTorch. The two have different inline namespaces, so they never meet at link time as long as neither is
-# linked as a library and no fmt type appears in a public header.
 add_library(q3d_options INTERFACE)
 target_compile_options(q3d_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow -fPIC
                        $<$<BOOL:${Q3D_WERROR}>:-Werror>)
 # GCC 12's straight-line vectoriser drops a rounding: of two neighbouring double -> float -> double conversions it
 # keeps neither. Crops that are to equal the official code's bit for bit then differ.
 target_compile_options(q3d_options INTERFACE $<$<CXX_COMPILER_ID:GNU>:-fno-tree-slp-vectorize>)
-target_compile_definitions(q3d_options INTERFACE FMT_HEADER_ONLY=1)
+target_link_libraries(q3d_options INTERFACE fmt::fmt)
 
-# One precompiled <torch/torch.h> for every target that sees LibTorch: it turns 15 s a file into a few.
+# LibTorch for our sources. Its wheel ships the headers of another version of fmt without that version's library, so a
+# folder that holds Debian's headers comes before them.
 if(Q3D_LIBTORCH)
-  add_library(q3d_torch_pch STATIC "${PROJECT_SOURCE_DIR}/cmake/torch_pch.cpp")
-  target_link_libraries(q3d_torch_pch PUBLIC q3d_options LibTorch::LibTorch)
-  target_precompile_headers(q3d_torch_pch PUBLIC <torch/torch.h>)
+  find_path(Q3D_FMT_INCLUDE_DIR fmt/format.h REQUIRED)
+  file(MAKE_DIRECTORY "${PROJECT_BINARY_DIR}/include/fmt_first")
+  file(CREATE_LINK "${Q3D_FMT_INCLUDE_DIR}/fmt" "${PROJECT_BINARY_DIR}/include/fmt_first/fmt" SYMBOLIC)
+  add_library(q3d_torch INTERFACE)
+  target_include_directories(q3d_torch SYSTEM BEFORE INTERFACE "${PROJECT_BINARY_DIR}/include/fmt_first")
+  target_link_libraries(q3d_torch INTERFACE LibTorch::LibTorch)
 endif()
 
-# The same for every other target: parsing nlohmann-json and fmt takes longer than most of our sources.
-add_library(q3d_plain_pch STATIC "${PROJECT_SOURCE_DIR}/cmake/plain_pch.cpp")
-target_link_libraries(q3d_plain_pch PUBLIC q3d_options nlohmann_json::nlohmann_json)
-target_precompile_headers(q3d_plain_pch PUBLIC
+# q3d_precompiled_header(NAME LIBS libs HEADERS headers): the library NAME carries a precompiled header, which targets
+# with the same options take over by REUSE_FROM.
+function(q3d_precompiled_header name)
+  cmake_parse_arguments(ARG "" "" "LIBS;HEADERS" ${ARGN})
+  add_library(${name} STATIC "${PROJECT_SOURCE_DIR}/cmake/precompiled_header.cpp")
+  target_link_libraries(${name} PUBLIC q3d_options nlohmann_json::nlohmann_json ${ARG_LIBS})
+  target_precompile_headers(${name} PUBLIC ${ARG_HEADERS})
+endfunction()
+
+set(Q3D_STANDARD_HEADERS
   <fmt/format.h> <nlohmann/json.hpp> <algorithm> <array> <cmath> <cstdint> <filesystem> <functional> <map> <memory>
   <optional> <span> <stdexcept> <string> <string_view> <vector>)
+# <torch/types.h> has the tensors. <torch/torch.h> has all modules too, which every source would instantiate again:
+# that takes three times as long.
+set(Q3D_TORCH_HEADERS <torch/types.h>)
+q3d_precompiled_header(q3d_plain_pch HEADERS ${Q3D_STANDARD_HEADERS})
+if(Q3D_LIBTORCH)
+  q3d_precompiled_header(q3d_torch_pch LIBS q3d_torch HEADERS ${Q3D_TORCH_HEADERS} ${Q3D_STANDARD_HEADERS})
+endif()
 
 # q3d_precompiled(TARGET TORCH_OR_EMPTY): the precompiled header that suits the target.
 function(q3d_precompiled target torch)
@@ -58,20 +72,27 @@ file(WRITE "${PROJECT_BINARY_DIR}/rooms.tsv" "")
 # q3d_room(JOB text [SOURCES ...] [PUBLIC libs] [PRIVATE libs] [TORCH] [PLAIN sources] [INSTALL])
 # The room of this folder: one folder, one namespace, one static target, one include root. The target's name is the
 # folder's path: pipeline/unit is q3d_pipeline_unit. TORCH adds LibTorch and its precompiled header; the sources after
-# PLAIN do without that header, which makes them quicker to compile. INSTALL makes it a
+# PLAIN include nothing of LibTorch and have the plain one, which makes them quicker to compile. INSTALL makes it a
 # part of the CMake package (cmake/Q3dInstall.cmake).
 function(q3d_room)
   cmake_parse_arguments(ARG "TORCH;INSTALL" "JOB" "SOURCES;PLAIN;PUBLIC;PRIVATE" ${ARGN})
   file(RELATIVE_PATH folder "${PROJECT_SOURCE_DIR}" "${CMAKE_CURRENT_SOURCE_DIR}")
   string(REPLACE "/" "_" name "q3d_${folder}")
-  add_library(${name} STATIC ${ARG_SOURCES} ${ARG_PLAIN})
+  add_library(${name} STATIC ${ARG_SOURCES})
   q3d_include_root(${name} PUBLIC)
   target_compile_features(${name} PUBLIC cxx_std_20)
-  target_link_libraries(${name} PUBLIC ${ARG_PUBLIC} PRIVATE "$<BUILD_INTERFACE:q3d_options>" ${ARG_PRIVATE})
+  target_link_libraries(${name} PUBLIC ${ARG_PUBLIC}
+                        PRIVATE "$<BUILD_INTERFACE:q3d_options>" fmt::fmt ${ARG_PRIVATE})
   q3d_precompiled(${name} "${ARG_TORCH}")
   if(ARG_TORCH)
-    target_link_libraries(${name} PUBLIC LibTorch::LibTorch)
-    set_source_files_properties(${ARG_PLAIN} PROPERTIES SKIP_PRECOMPILE_HEADERS ON)
+    target_link_libraries(${name} PUBLIC q3d_torch)
+  endif()
+  if(ARG_PLAIN)
+    add_library(${name}_plain OBJECT ${ARG_PLAIN})
+    q3d_include_root(${name}_plain PRIVATE)
+    target_link_libraries(${name}_plain PRIVATE q3d_options ${ARG_PUBLIC} ${ARG_PRIVATE})
+    q3d_precompiled(${name}_plain "")
+    target_sources(${name} PRIVATE $<TARGET_OBJECTS:${name}_plain>)
   endif()
   if(ARG_INSTALL)
     q3d_install_room(${name} ${folder})
@@ -91,12 +112,17 @@ function(q3d_test name)
   cmake_parse_arguments(ARG "TORCH" "LABEL" "SOURCES;LIBS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE q3d_options q3d_test_support ${ARG_LIBS} GTest::gtest_main)
-  q3d_precompiled(${name} "${ARG_TORCH}")
+  target_link_libraries(${name} PRIVATE q3d_test_options)
+  if(ARG_TORCH)
+    target_precompile_headers(${name} REUSE_FROM q3d_torch_test_pch)
+  else()
+    target_precompile_headers(${name} REUSE_FROM q3d_test_pch)
+  endif()
   if(NOT ARG_LABEL)
     set(ARG_LABEL unit)
   endif()
   if(ARG_TORCH)
-    target_link_libraries(${name} PRIVATE LibTorch::LibTorch)
+    target_link_libraries(${name} PRIVATE q3d_torch)
     q3d_discover_suites(${name} ${ARG_LABEL} 600)
   else()
     gtest_discover_tests(${name} TEST_PREFIX "${name}." DISCOVERY_TIMEOUT 120

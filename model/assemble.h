@@ -1,7 +1,7 @@
 // From the decoder's numbers to a body in front of the crop's camera. Official code: PRIMA.forward_step.
 #pragma once
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include "model/decoder.h"
 #include "model/net.h"

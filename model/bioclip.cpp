@@ -101,7 +101,7 @@ torch::Tensor BioClip::features(const torch::Tensor& images, const Observer& obs
 torch::Tensor BioClip::forward(const torch::Tensor& images, const Observer& observe) const {
   torch::Tensor feature;
   {
-    const torch::AutoGradMode mode(learns_ && torch::GradMode::is_enabled());
+    const at::AutoGradMode mode(learns_ && at::GradMode::is_enabled());
     feature = features(images, observe);
   }
   if (observe) observe("bioclip_feature", feature);

@@ -2,7 +2,8 @@
 // code: bioclip_embedding.py and open_clip's VisionTransformer.
 #pragma once
 
-#include <torch/torch.h>
+#include <torch/nn/module.h>
+#include <torch/types.h>
 
 #include <memory>
 #include <vector>

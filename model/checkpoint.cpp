@@ -129,7 +129,7 @@ PrimaConfig checkpoint_config(const smal::tensors::SafeTensors& file) {
 
 std::shared_ptr<PrimaNet> load_net(const smal::tensors::SafeTensors& file, const PrimaConfig& config,
                                    const smal::tensors::SmalAsset& asset, const Placement& placement) {
-  const torch::NoGradGuard no_grad;
+  const at::NoGradGuard no_grad;
   const PrimaNet plan(config, {torch::kMeta, placement.matrix_dtype});
   if (const auto faults = find_faults(file, plan, asset); !faults.empty()) {
     std::string message =

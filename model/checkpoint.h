@@ -2,7 +2,7 @@
 // metadata, as JSON under "prima_config".
 #pragma once
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <cstdint>
 #include <filesystem>

@@ -4,7 +4,8 @@
 // thousands. For networks trained from scratch: the official weights have no such stem.
 #pragma once
 
-#include <torch/torch.h>
+#include <torch/nn/module.h>
+#include <torch/types.h>
 
 #include <memory>
 #include <string>

@@ -2,7 +2,8 @@
 // NewBioGuidedSMALPoseDecoder.
 #pragma once
 
-#include <torch/torch.h>
+#include <torch/nn/module.h>
+#include <torch/types.h>
 
 #include <memory>
 #include <string>

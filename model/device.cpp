@@ -5,6 +5,7 @@
 #include <dlfcn.h>
 #include <fmt/format.h>
 #include <malloc.h>
+#include <torch/cuda.h>
 
 #include <array>
 #include <charconv>

@@ -1,7 +1,7 @@
 // The one place that knows CUDA exists.
 #pragma once
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <string>
 

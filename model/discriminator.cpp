@@ -62,7 +62,7 @@ torch::Tensor Discriminator::forward(const torch::Tensor& rotations, const torch
 }
 
 void initialise(Discriminator& discriminator, std::uint64_t seed) {
-  const torch::NoGradGuard no_grad;
+  const at::NoGradGuard no_grad;
   for (auto& parameter : discriminator.named_parameters()) {
     torch::Tensor& values = parameter.value();
     torch::Tensor fresh = torch::zeros(values.sizes());

@@ -8,7 +8,8 @@
 // two ranks would not add up to the whole, and batches of 16 are too small to estimate them.
 #pragma once
 
-#include <torch/torch.h>
+#include <torch/nn/module.h>
+#include <torch/types.h>
 
 #include <cstdint>
 #include <memory>

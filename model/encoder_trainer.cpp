@@ -60,7 +60,7 @@ class EncoderTrainer::Heads : public torch::nn::Module {
         register_module("keypoints", std::make_shared<Linear>(config.embed_dim, kKeypoints, placement));
     backbone = register_module("backbone", std::make_shared<Linear>(config.embed_dim, species, placement));
     bioclip = register_module("bioclip", std::make_shared<Linear>(config.clip_out, species, placement));
-    const torch::NoGradGuard no_grad;
+    const at::NoGradGuard no_grad;
     for (auto& parameter : named_parameters()) {
       parameter.value().copy_(
           initial_tensor({"heads." + parameter.key(), parameter.value().sizes().vec()}, seed));

@@ -4,7 +4,7 @@
 // tokens each keypoint lies, and both learn to name the species.
 #pragma once
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <cstdint>
 #include <memory>

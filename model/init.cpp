@@ -117,7 +117,7 @@ torch::Tensor initial_tensor(const TensorSpec& spec, std::uint64_t seed) {
 }
 
 void initialise(PrimaNet& net, std::uint64_t seed) {
-  const torch::NoGradGuard no_grad;
+  const at::NoGradGuard no_grad;
   for (auto& parameter : net.named_parameters()) {
     parameter.value().copy_(initial_tensor({parameter.key(), parameter.value().sizes().vec()}, seed));
   }

@@ -1,7 +1,7 @@
 // Seeded fresh weights, for tests, benchmarks and training from scratch.
 #pragma once
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <cstdint>
 

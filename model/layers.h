@@ -6,7 +6,8 @@
 // a rounding error from a mistake. Memory is left uninitialised: weights come from a checkpoint.
 #pragma once
 
-#include <torch/torch.h>
+#include <torch/nn/module.h>
+#include <torch/types.h>
 
 #include <functional>
 #include <string>

@@ -1,7 +1,7 @@
 // What a training run needs of whatever it trains: a step at a time, and a state that goes on bit for bit.
 #pragma once
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <string>
 #include <utility>

@@ -4,7 +4,7 @@
 // rate belongs to a batch size. The others are means and keep sum and count apart.
 #pragma once
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include "model/partial_mean.h"
 #include "model/prima.h"

@@ -1,7 +1,7 @@
 // LibTorch's autocast for one scope.
 #pragma once
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 namespace q3d::model {
 

@@ -34,7 +34,7 @@ torch::Tensor restored_like(const smal::tensors::SafeTensors& file, const std::s
 
 void restore_parameters(const smal::tensors::SafeTensors& file, const std::string& prefix,
                         torch::nn::Module& module) {
-  const torch::NoGradGuard no_grad;
+  const at::NoGradGuard no_grad;
   for (auto& parameter : module.named_parameters()) {
     parameter.value().copy_(restored_like(file, prefix + parameter.key(), parameter.value()));
   }

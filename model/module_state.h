@@ -1,7 +1,8 @@
 // A module's parameters as named tensors and back, bit for bit.
 #pragma once
 
-#include <torch/torch.h>
+#include <torch/nn/module.h>
+#include <torch/types.h>
 
 #include <string>
 

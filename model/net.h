@@ -2,7 +2,8 @@
 // mode, like every torch module; Prima::load hands out a frozen one in evaluation mode.
 #pragma once
 
-#include <torch/torch.h>
+#include <torch/nn/module.h>
+#include <torch/types.h>
 
 #include <memory>
 

@@ -74,7 +74,7 @@ void AdamW::zero_grad() {
 }
 
 void AdamW::step(double learning_rate) {
-  const torch::NoGradGuard no_grad;
+  const at::NoGradGuard no_grad;
   for (Group& group : groups_) {
     std::vector<torch::Tensor> parameters, gradients, first, second, steps;
     for (Slot& slot : group.slots) {
@@ -104,14 +104,14 @@ std::vector<torch::Tensor> AdamW::gradients() const {
 }
 
 torch::Tensor AdamW::gradient_norm() const {
-  const torch::NoGradGuard no_grad;
+  const at::NoGradGuard no_grad;
   const std::vector<torch::Tensor> all = gradients();
   if (all.empty()) return torch::zeros({});
   return torch::stack(at::_foreach_norm(all)).norm();
 }
 
 void AdamW::clip(const torch::Tensor& norm, double largest) {
-  const torch::NoGradGuard no_grad;
+  const at::NoGradGuard no_grad;
   const torch::Tensor scale = (largest / (norm + 1e-6)).clamp_max(1.0);
   for (torch::Tensor& gradient : gradients()) gradient.mul_(scale);
 }

@@ -1,7 +1,7 @@
 // AdamW over groups of named parameters, with a state that survives the disk bit for bit.
 #pragma once
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <cstdint>
 #include <string>

@@ -2,7 +2,7 @@
 // divided.
 #pragma once
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <vector>
 

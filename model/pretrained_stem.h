@@ -2,7 +2,7 @@
 // metadata. tools/import_stem.py writes it.
 #pragma once
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <filesystem>
 #include <map>

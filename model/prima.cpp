@@ -74,13 +74,13 @@ torch::Tensor Prima::normalise(const torch::Tensor& crops_u8) const {
 
 ImageFeatures Prima::encode(const torch::Tensor& images) const {
   require_crops("images", images, net_->placement().vector_dtype());
-  const torch::NoGradGuard no_grad;
+  const at::NoGradGuard no_grad;
   return net_->encode(images);
 }
 
 Prediction Prima::predict(const ImageFeatures& features, bool with_vertices) const {
   require_features(*net_, features);
-  const torch::NoGradGuard no_grad;
+  const at::NoGradGuard no_grad;
   const Decoder& decoder = net_->decoder();
   const torch::Tensor initial_betas = decoder.initial_betas(features.bio_token);
   const DecoderOutput output =

@@ -2,7 +2,7 @@
 // losses.PosePriorLoss and losses.ShapePriorLoss.
 #pragma once
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <filesystem>
 

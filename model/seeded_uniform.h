@@ -1,7 +1,7 @@
 // Uniform random numbers that are the same on every machine.
 #pragma once
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <cstdint>
 #include <string_view>

@@ -186,7 +186,7 @@ void Trainer::restore(const smal::tensors::SafeTensors& file) {
 }
 
 std::shared_ptr<PrimaNet> with_config(const PrimaNet& net, const PrimaConfig& config) {
-  const torch::NoGradGuard no_grad;
+  const at::NoGradGuard no_grad;
   auto result = std::make_shared<PrimaNet>(config, net.placement());
   const auto from = net.named_parameters();
   for (auto& parameter : result->named_parameters()) {

@@ -2,7 +2,7 @@
 // official code: PRIMA.training_step and training_step_discriminator.
 #pragma once
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <cstdint>
 #include <memory>

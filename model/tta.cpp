@@ -1,6 +1,7 @@
 #include "model/tta.h"
 
 #include <fmt/format.h>
+#include <torch/csrc/autograd/autograd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -186,14 +187,14 @@ class Adaptation {
   }
 
   Iterate evaluate(const std::vector<torch::Tensor>& parameters, bool with_gradient) const {
-    const torch::AutoGradMode mode(with_gradient);
+    const at::AutoGradMode mode(with_gradient);
     const DecoderOutput output =
         decoder().refine(slots_.memory(), slots_.initial_betas(), from_list(parameters));
     const torch::Tensor projected = projected_keypoints(prima_.body(), output, prima_.config().focal_px);
     const KeypointTargets targets = slots_.targets();
     Iterate iterate;
     iterate.loss = objective(options_, projected, output.aux_keypoints_2d, targets);
-    const torch::NoGradGuard no_grad;
+    const at::NoGradGuard no_grad;
     iterate.l_proj = mean_absolute_error(projected, targets, targets.visible);
     iterate.held_out = holds_out_ ? mean_absolute_error(projected, targets, targets.held_out)
                                   : torch::zeros_like(iterate.l_proj);
@@ -267,7 +268,7 @@ class Adaptation {
 TtaResult adapt(const Prima& prima, const ImageFeatures& features, const torch::Tensor& keypoints,
                 const std::vector<filters::adaptation::Schedule>& schedules, const TtaOptions& options) {
   check_arguments(prima, features, keypoints, schedules, options);
-  const torch::NoGradGuard no_grad;
+  const at::NoGradGuard no_grad;
   return Adaptation(prima, features, keypoints, schedules, options).run();
 }
 

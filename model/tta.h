@@ -4,7 +4,7 @@
 // stopping rule.
 #pragma once
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <vector>
 

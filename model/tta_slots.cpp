@@ -38,7 +38,7 @@ TtaSlots::TtaSlots(const AdaptedParameters& initial, DecoderMemory memory, torch
       memory_(std::move(memory)),
       initial_betas_(std::move(initial_betas)),
       targets_(std::move(targets)) {
-  const torch::NoGradGuard no_grad;
+  const at::NoGradGuard no_grad;
   std::iota(instances_.begin(), instances_.end(), std::int64_t{0});
   for (const torch::Tensor& shared : to_list(initial)) {
     std::vector<std::int64_t> repeats(static_cast<std::size_t>(shared.dim()) + 1, 1);
@@ -73,7 +73,7 @@ KeypointTargets TtaSlots::targets() const {
 }
 
 void TtaSlots::step(const std::vector<torch::Tensor>& gradients, double learning_rate) {
-  const torch::NoGradGuard no_grad;
+  const at::NoGradGuard no_grad;
   std::vector<torch::Tensor> parameters, grads, first, second;
   for (std::size_t i = 0; i < parameters_.size(); ++i) {
     parameters.push_back(active(parameters_[i]));
@@ -87,7 +87,7 @@ void TtaSlots::step(const std::vector<torch::Tensor>& gradients, double learning
 }
 
 void TtaSlots::remove(std::int64_t slot) {
-  const torch::NoGradGuard no_grad;
+  const at::NoGradGuard no_grad;
   const std::int64_t last = size() - 1;
   const auto move_row = [&](const torch::Tensor& rows) {
     if (slot != last) rows.select(0, slot).copy_(rows.select(0, last));

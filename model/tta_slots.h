@@ -1,7 +1,7 @@
 // The instances that are still adapting, packed into the first rows of every tensor they need.
 #pragma once
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <vector>
 

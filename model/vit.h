@@ -1,7 +1,8 @@
 // The ViT image encoder. Paper section "Image Encoders"; official code: backbones/vit.py.
 #pragma once
 
-#include <torch/torch.h>
+#include <torch/nn/module.h>
+#include <torch/types.h>
 
 #include <memory>
 #include <vector>

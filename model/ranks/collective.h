@@ -5,7 +5,7 @@
 // weights alike and need never exchange them.
 #pragma once
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <memory>
 #include <vector>

@@ -1,7 +1,7 @@
 // Several ranks over the network, by LibTorch's own c10d.
 #pragma once
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <memory>
 

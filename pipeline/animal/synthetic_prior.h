@@ -1,7 +1,7 @@
 // What poses and shapes the synthetic quadruped takes: priors in the official layout, and samples from them.
 #pragma once
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <random>
 

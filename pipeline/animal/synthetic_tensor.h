@@ -1,7 +1,7 @@
 // From Eigen to LibTorch.
 #pragma once
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <Eigen/Core>
 #include <vector>

@@ -1,6 +1,6 @@
 #include "pipeline/network/torch_bodies.h"
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <algorithm>
 
@@ -57,7 +57,7 @@ std::vector<std::array<std::int32_t, 3>> TorchBodyMeshes::faces() const {
 }
 
 std::vector<device::BodyMesh> TorchBodyMeshes::pose(std::span<const smal::Body> bodies) const {
-  const torch::NoGradGuard no_gradients;
+  const at::NoGradGuard no_gradients;
   std::vector<device::BodyMesh> meshes;
   meshes.reserve(bodies.size());
   for (std::size_t first = 0; first < bodies.size(); first += kBatch) {

@@ -1,7 +1,7 @@
 #include "pipeline/network/torch_network.h"
 
 #include <fmt/format.h>
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <algorithm>
 #include <cmath>
@@ -124,7 +124,7 @@ class TorchNetwork : public device::Network {
 
 std::vector<device::BodyPrediction> TorchNetwork::predict(std::span<const device::PatchView> patches) {
   begin();
-  const torch::InferenceMode no_gradients;
+  const c10::InferenceMode no_gradients;
   std::vector<device::BodyPrediction> rows;
   rows.reserve(patches.size());
   for (std::size_t first = 0; first < patches.size(); first += predict_batch_) {
@@ -155,7 +155,7 @@ std::vector<device::AdaptOutcome> TorchNetwork::adapt(std::span<const device::Ad
       out = std::copy(numbers.begin(), numbers.end(), out);
     }
     const model::ImageFeatures features = [&] {
-      const torch::NoGradGuard no_gradients;
+      const at::NoGradGuard no_gradients;
       return prima_.encode(prima_.normalise(stack_patches(patches)));
     }();
     const model::TtaResult result = model::adapt(prima_, features, keypoints, schedules, options);

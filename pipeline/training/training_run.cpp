@@ -1,7 +1,7 @@
 #include "pipeline/training/training_run.h"
 
 #include <fmt/format.h>
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <algorithm>
 #include <chrono>
@@ -139,7 +139,7 @@ std::shared_ptr<model::PrimaNet> initial_net(const TrainingNetworkConfig& networ
   const model::PrimaConfig config = initial_config(file, network.without);
   auto net = model::load_net(file, config, asset, {device, torch::kFloat32});
   if (network.encoders.empty()) return net;
-  const torch::NoGradGuard no_grad;
+  const at::NoGradGuard no_grad;
   const smal::tensors::SafeTensors encoders = smal::tensors::SafeTensors::open(network.encoders);
   for (auto& parameter : net->named_parameters()) {
     const std::string& name = parameter.key();
@@ -384,7 +384,7 @@ class Run {
   void step(const PhaseConfig& phase, model::Learner& learner, const feed::Feed& feed,
             feed::FeedBatch&& batch, std::optional<TrainingLog>& log, TrainingSummary& summary) {
     const std::int64_t first_draw = batch.first_draw;
-    torch::manual_seed(step_seed(config_, position_, ranks_->rank()));
+    at::manual_seed(step_seed(config_, position_, ranks_->rank()));
     const model::StepReport report = learner.step(to_tensors(std::move(batch)));
     const auto fault = position_.watch.check(report.loss, report.gradient_norm, config_.divergence_factor);
     if (fault) stop(phase, *fault, report, feed.ids(first_draw));

@@ -69,7 +69,7 @@ void BodyModel::save(const std::filesystem::path& asset) const {
 }
 
 std::vector<Body> BodyModel::pose(std::span<const Posture> postures) const {
-  const torch::InferenceMode no_gradient;
+  const c10::InferenceMode no_gradient;
   const auto count = static_cast<std::int64_t>(postures.size());
   auto pose = torch::empty({count, smal::kNumJoints, 3});
   auto betas = torch::empty({count, smal::kNumBetas});

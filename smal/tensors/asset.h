@@ -1,7 +1,7 @@
 // The SMAL asset: everything that defines a body model, in one safetensors file.
 #pragma once
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <cstdint>
 #include <filesystem>

@@ -1,7 +1,7 @@
 // The SMAL body as a differentiable function of pose, betas and translation.
 #pragma once
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <memory>
 

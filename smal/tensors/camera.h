@@ -1,7 +1,7 @@
 // The crop camera and the full-image camera.
 #pragma once
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include "smal/camera.h"
 

@@ -1,7 +1,7 @@
 // Rotations: 6D, axis-angle and matrix forms, as the official code computes them.
 #pragma once
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 namespace q3d::smal::tensors {
 

@@ -1,7 +1,7 @@
 // safetensors files: memory-mapped reading and atomic writing.
 #pragma once
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <filesystem>
 #include <map>

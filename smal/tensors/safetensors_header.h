@@ -1,7 +1,7 @@
 // The JSON header of a safetensors file.
 #pragma once
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <cstdint>
 #include <map>

@@ -1,7 +1,7 @@
 // Shape and dtype checks at the doors of the public functions of smal/.
 #pragma once
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <vector>
 

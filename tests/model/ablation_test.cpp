@@ -25,14 +25,14 @@ class Ablation : public ::testing::Test {
     const smal::tensors::SafeTensors file = smal::tensors::SafeTensors::open(path);
     EXPECT_EQ(checkpoint_config(file), config);
     auto net = std::make_shared<PrimaNet>(config);
-    const torch::NoGradGuard no_grad;
+    const at::NoGradGuard no_grad;
     for (auto& parameter : net->named_parameters()) parameter.value().copy_(file.tensor(parameter.key()));
     net->eval();
     return net;
   }
 
   static Outcome run(const PrimaNet& net) {
-    torch::manual_seed(11);
+    at::manual_seed(11);
     const ImageFeatures features = net.encode(torch::randn({2, 3, 256, 256}));
     const Decoder& decoder = net.decoder();
     const torch::Tensor betas = decoder.initial_betas(features.bio_token);

@@ -7,7 +7,7 @@ namespace {
 
 // A stem whose convolutions pass their first input channel on: the centre weight is 1, all others 0.
 TEST(ConvStem, FollowsTheHandComputedMaps) {
-  const torch::NoGradGuard no_grad;
+  const at::NoGradGuard no_grad;
   ConvStem stem(64, 1, {torch::kCPU, torch::kFloat64});
   for (auto& parameter : stem.named_parameters()) {
     torch::Tensor& value = parameter.value();
@@ -17,7 +17,7 @@ TEST(ConvStem, FollowsTheHandComputedMaps) {
     if (parameter.key().ends_with("norm.weight")) value.fill_(1);
   }
   stem.named_parameters()["proj.weight"].copy_(torch::eye(64, torch::kFloat64));
-  torch::manual_seed(5);
+  at::manual_seed(5);
   const torch::Tensor images = torch::randn({2, 3, 64, 32}, torch::kFloat64);
   // All channels are equal, so group norm standardises each picture's map by itself.
   const auto unit = [](const torch::Tensor& map, std::int64_t stride) {
@@ -50,10 +50,10 @@ TEST(Tokeniser, RegistersTheOfficialNameOrAStem) {
 // The matrix in the projection's place maps the channels of each place on the map to its token, in row-major
 // order.
 TEST(Tokeniser, MapsAnEfficientNetsChannels) {
-  const torch::NoGradGuard no_grad;
+  const at::NoGradGuard no_grad;
   torch::nn::Module owner("owner");
   const Tokeniser tokeniser(owner, {"conv1", 16, 0, false}, 64, {.efficientnet = true}, {});
-  torch::manual_seed(2);
+  at::manual_seed(2);
   for (auto& parameter : owner.named_parameters()) {
     EXPECT_TRUE(parameter.key().starts_with("efficientnet.") || parameter.key() == "conv1.weight" ||
                 parameter.key() == "conv1.bias")

@@ -16,7 +16,7 @@ namespace {
 void load_golden(Discriminator& discriminator, const smal::tensors::SafeTensors& file) {
   std::ifstream stream(testing::parity_dir() / "discriminator.json");
   const nlohmann::json scales = nlohmann::json::parse(stream).at("meta").at("scales");
-  const torch::NoGradGuard no_grad;
+  const at::NoGradGuard no_grad;
   for (auto& parameter : discriminator.named_parameters()) {
     const std::string name = "discriminator." + parameter.key();
     const torch::Tensor values =
@@ -33,7 +33,7 @@ void expect_scores_and_losses(torch::ScalarType dtype, double tolerance) {
   const auto given = [&](const char* name) { return file.tensor(name).to(dtype); };
   Discriminator discriminator({torch::kCPU, dtype});
   load_golden(discriminator, file);
-  const torch::NoGradGuard no_grad;
+  const at::NoGradGuard no_grad;
   const torch::Tensor predicted = discriminator.forward(given("pose").view({-1, 34, 3, 3}), given("betas"));
   const torch::Tensor rotations = smal::tensors::axis_angle_to_matrix(given("gt_pose_aa").view({-1, 34, 3}));
   const torch::Tensor real = discriminator.forward(rotations, given("gt_betas"));

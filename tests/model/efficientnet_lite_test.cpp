@@ -15,7 +15,7 @@ std::filesystem::path shipped_stem() {
 }
 
 std::shared_ptr<EfficientNetLite> shipped_network(torch::ScalarType dtype) {
-  const torch::NoGradGuard no_grad;
+  const at::NoGradGuard no_grad;
   const PretrainedStem stem(shipped_stem());
   auto network = std::make_shared<EfficientNetLite>(Placement{torch::kCPU, dtype});
   for (auto& parameter : network->named_parameters()) {
@@ -43,7 +43,7 @@ class Golden : public ::testing::Test {
 };
 
 TEST_F(Golden, FeaturesAreThePackages) {
-  const torch::NoGradGuard no_grad;
+  const at::NoGradGuard no_grad;
   const torch::Tensor got = shipped_network(torch::kFloat64)->forward(images(torch::kFloat64));
   ASSERT_EQ(got.sizes(), features().sizes());
   ASSERT_EQ(got.sizes(), (at::IntArrayRef{2, EfficientNetLite::kChannels, 8, 6}));
@@ -53,7 +53,7 @@ TEST_F(Golden, FeaturesAreThePackages) {
 }
 
 TEST_F(Golden, FeaturesInFloat32DifferByItsRounding) {
-  const torch::NoGradGuard no_grad;
+  const at::NoGradGuard no_grad;
   const torch::Tensor got = shipped_network(torch::kFloat32)->forward(images(torch::kFloat32));
   ASSERT_EQ(got.scalar_type(), torch::kFloat32);
   const torch::Tensor error = (got.to(torch::kFloat64) - features()).abs().max();
@@ -75,8 +75,8 @@ TEST_F(Golden, GradientsAreTheSlopes) {
   const torch::Tensor pictures = images(torch::kFloat64);
   const auto loss = [&] { return network->forward(pictures).square().mean(); };
   loss().backward();
-  torch::manual_seed(3);
-  const torch::NoGradGuard no_grad;
+  at::manual_seed(3);
+  const at::NoGradGuard no_grad;
   std::vector<torch::Tensor> direction;
   double slope = 0.0;
   for (const torch::Tensor& parameter : network->parameters()) {

@@ -37,7 +37,7 @@ TensorMap as_official(const Prediction& prediction) {
 
 // Every observed intermediate under its official name, and the whole prediction computed while observing.
 TensorMap observe_all(const Prima& prima, const torch::Tensor& input_index) {
-  const torch::NoGradGuard no_grad;
+  const at::NoGradGuard no_grad;
   TensorMap seen;
   const Observer observe = [&](const std::string& name, const torch::Tensor& tensor) { seen[name] = tensor; };
   const ImageFeatures features = prima.net().encode(testing::parity_images(prima, input_index), observe);
@@ -156,7 +156,7 @@ TEST(BioClipParity, QuickGelu) {
     PrimaConfig config = testing::parity_config(which);
     config.clip_quick_gelu = true;
     const auto compute = [&](const Prima& prima) {
-      const torch::NoGradGuard no_grad;
+      const at::NoGradGuard no_grad;
       TensorMap seen;
       prima.net().bioclip().forward(
           testing::parity_images(prima, golden.tensor("input_index")),

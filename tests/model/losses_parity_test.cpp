@@ -179,12 +179,12 @@ class Float32LossesParity : public LossesParity {
 };
 
 TEST_P(LossesParity, EachTerm) {
-  const torch::NoGradGuard no_grad;
+  const at::NoGradGuard no_grad;
   expect_terms("term_", terms(targets_));
 }
 
 TEST_P(LossesParity, EachTermWhenAllSamplesHaveTruth) {
-  const torch::NoGradGuard no_grad;
+  const at::NoGradGuard no_grad;
   Targets targets = targets_;
   targets.has_pose = torch::ones_like(targets.has_pose);
   targets.has_betas = torch::ones_like(targets.has_betas);
@@ -194,7 +194,7 @@ TEST_P(LossesParity, EachTermWhenAllSamplesHaveTruth) {
 // float32 is what users run. Where a joint's 6D columns are nearly parallel, rounding, which differs from one
 // instruction set to the next, shows up to 4e-5 in the pose prior.
 TEST_P(Float32LossesParity, EachTerm) {
-  const torch::NoGradGuard no_grad;
+  const at::NoGradGuard no_grad;
   expect_terms("term_", terms(targets_), 1e-3);
 }
 

@@ -24,7 +24,7 @@ TEST(KeypointLoss, IsTheWeightedSumOfAbsoluteErrors) {
 }
 
 TEST(KeypointLoss, CentredIgnoresACommonShift) {
-  torch::manual_seed(1);
+  at::manual_seed(1);
   const torch::Tensor predicted = torch::randn({2, 26, 3});
   const torch::Tensor target =
       torch::cat({predicted + torch::tensor({3.0F, -1.0F, 7.0F}), torch::ones({2, 26, 1})}, 2);
@@ -105,7 +105,7 @@ TEST(ContrastiveLoss, ByHand) {
 }
 
 TEST(ContrastiveLoss, SamplesWithoutFamilyTakeNoPart) {
-  torch::manual_seed(2);
+  at::manual_seed(2);
   torch::Tensor features = torch::randn({5, 8});
   features = features / features.norm(2, 1, true);
   const torch::Tensor all = torch::tensor({0, -1, 1, 0, -1}, torch::kInt64);

@@ -12,7 +12,7 @@ namespace {
 // Two groups of parameters with seeded numbers, and seeded gradients for each step.
 struct Problem {
   explicit Problem(std::uint64_t seed) {
-    torch::manual_seed(seed);
+    at::manual_seed(seed);
     for (const std::int64_t size : {7, 33}) {
       parameters.push_back(torch::randn({size, 3}).requires_grad_());
     }
@@ -21,7 +21,7 @@ struct Problem {
     return {{{{"first", parameters[0]}}, 0.1}, {{{"second", parameters[1]}}, 1.0}};
   }
   void set_gradients(int step) {
-    torch::manual_seed(1000 + static_cast<std::uint64_t>(step));
+    at::manual_seed(1000 + static_cast<std::uint64_t>(step));
     for (torch::Tensor& parameter : parameters) parameter.mutable_grad() = torch::randn_like(parameter);
   }
   std::vector<torch::Tensor> parameters;

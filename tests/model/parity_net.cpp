@@ -15,7 +15,7 @@ namespace q3d::testing {
 namespace {
 
 void move_weights(const model::Prima& prima, std::uint64_t seed) {
-  const torch::NoGradGuard no_grad;
+  const at::NoGradGuard no_grad;
   auto generator = torch::make_generator<torch::CPUGeneratorImpl>(seed);
   for (auto& weight : prima.net().parameters()) {
     const torch::Tensor part = torch::rand(weight.sizes(), generator, torch::kFloat64) * 2.0 - 1.0;

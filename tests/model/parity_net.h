@@ -5,7 +5,7 @@
 // rounding. Some golden files state how large that is; where they do not, float32_noise tells.
 #pragma once
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <functional>
 #include <map>

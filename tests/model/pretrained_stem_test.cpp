@@ -69,7 +69,7 @@ TEST_F(Stem, HalfPrecisionKeepsTheFeatures) {
   const Prima full = Prima::load(path("full"), path("body"), torch::kCPU);
   const Prima half = Prima::load(path("half"), path("body"), torch::kCPU);
   EXPECT_EQ(half.config(), sizes());
-  torch::manual_seed(11);
+  at::manual_seed(11);
   const torch::Tensor images = full.normalise(torch::randint(0, 256, {1, 3, 256, 256}, torch::kUInt8));
   const torch::Tensor expected = full.encode(images).image_tokens;
   const torch::Tensor error = (half.encode(images).image_tokens - expected).norm() / expected.norm();

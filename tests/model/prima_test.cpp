@@ -28,7 +28,7 @@ class PrimaTest : public ::testing::Test {
   }
 
   static torch::Tensor crops(std::int64_t batch) {
-    torch::manual_seed(11);
+    at::manual_seed(11);
     return torch::randint(0, 256, {batch, 3, 256, 256}, torch::kUInt8);
   }
 

@@ -26,7 +26,7 @@ PrimaConfig small_config() {
 
 // Noise for pictures, and a seeded body of the golden asset to be found in them.
 TrainingBatch seeded_batch(const smal::tensors::SmalBody& body, std::uint64_t seed) {
-  torch::manual_seed(seed);
+  at::manual_seed(seed);
   constexpr std::int64_t kBatch = 3;
   TrainingBatch batch;
   batch.images = torch::randn({kBatch, 3, 256, 256});
@@ -107,7 +107,7 @@ TEST_F(TrainerTest, UnrotatedJointsHaveAFiniteGradient) {
     options.variant = variant;
     Trainer learner = trainer(options);
     {
-      const torch::NoGradGuard no_grad;
+      const at::NoGradGuard no_grad;
       for (auto& parameter : learner.net().named_parameters()) {
         if (parameter.key().starts_with("smal_head.decpose.2.")) parameter.value().zero_();
       }
@@ -151,7 +151,7 @@ TEST_F(TrainerTest, GoesOnBitForBitFromASavedState) {
   const auto train = [&](Trainer& learner, std::uint64_t first, std::uint64_t end) {
     for (std::uint64_t i = first; i < end; ++i) {
       const TrainingBatch batch = seeded_batch(body_, i);
-      torch::manual_seed(100 + i);
+      at::manual_seed(100 + i);
       learner.step(batch);
     }
   };

@@ -1,6 +1,6 @@
 // Crops and augmentation against the numbers of the official code (tests/data/parity/crops*, augment*).
 #include <gtest/gtest.h>
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <fstream>
 #include <nlohmann/json.hpp>

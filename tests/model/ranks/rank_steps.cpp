@@ -53,7 +53,7 @@ void for_each(TrainingBatch& batch, const std::function<void(torch::Tensor&)>& c
 // Two ranks get 1 and 2 samples without pose, 2 and 3 without betas; each family has samples on both, and
 // the second rank has more labelled keypoints and fewer known species.
 TrainingBatch joint_batch(const smal::tensors::SmalBody& body) {
-  torch::manual_seed(11);
+  at::manual_seed(11);
   TrainingBatch batch;
   batch.images = torch::randn({kBatch, 3, 256, 256});
   Targets& targets = batch.targets;

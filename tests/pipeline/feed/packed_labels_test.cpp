@@ -136,7 +136,7 @@ torch::Tensor tensor_of(const std::vector<float>& values, std::vector<std::int64
 // the loss sees them, since a body turns about its root and not about the origin.
 double distance_from_body(const FeedBatch& batch, const fs::path& asset) {
   const smal::tensors::SmalBody body(smal::tensors::load_asset(asset));
-  const torch::InferenceMode no_gradients;
+  const c10::InferenceMode no_gradients;
   const torch::Tensor rotations = tensor_of(batch.rotations, {kDraws, manifests::kNumJoints, 3, 3});
   const torch::Tensor expected =
       body.keypoints(rotations, tensor_of(batch.betas, {kDraws, manifests::kNumBetas}));

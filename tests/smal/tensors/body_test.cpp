@@ -23,7 +23,7 @@ struct Arguments {
 };
 
 Arguments random_arguments(std::int64_t batch, torch::ScalarType dtype) {
-  torch::manual_seed(11);
+  at::manual_seed(11);
   return {axis_angle_to_matrix_exact(0.4 * torch::randn({batch, kNumJoints, 3}, dtype)),
           0.5 * torch::randn({batch, kNumBetas}, dtype), torch::randn({batch, 3}, dtype)};
 }
@@ -75,7 +75,7 @@ TEST(SmalBody, DoublePrecisionAgreesWithSingle) {
 // Gradients of a weighted sum against central differences, in double precision.
 TEST(SmalBody, GradientsMatchFiniteDifferences) {
   const SmalBody body = SmalBody(good_asset()).to_dtype(torch::kFloat64);
-  torch::manual_seed(5);
+  at::manual_seed(5);
   torch::Tensor axis_angle = (0.4 * torch::randn({1, kNumJoints, 3}, torch::kFloat64)).requires_grad_();
   torch::Tensor betas = (0.5 * torch::randn({1, kNumBetas}, torch::kFloat64)).requires_grad_();
   torch::Tensor transl = torch::randn({1, 3}, torch::kFloat64).requires_grad_();
@@ -87,7 +87,7 @@ TEST(SmalBody, GradientsMatchFiniteDifferences) {
            (body.forward(rotations, betas, transl).vertices * vertex_weights).sum();
   };
   loss().backward();
-  const torch::NoGradGuard no_grad;
+  const at::NoGradGuard no_grad;
   constexpr double kStep = 1e-5;
   for (torch::Tensor* input : {&axis_angle, &betas, &transl}) {
     torch::Tensor flat = input->view(-1);

@@ -38,7 +38,7 @@ TEST(Rotation, ExactFormIsAccurateAtSmallAngles) {
 }
 
 TEST(Rotation, ExactFormIsOrthogonalAndItsAngleIsRight) {
-  torch::manual_seed(3);
+  at::manual_seed(3);
   const torch::Tensor axis_angle = 2.0 * torch::randn({50, 3}, torch::kFloat64);
   const torch::Tensor matrix = axis_angle_to_matrix_exact(axis_angle);
   EXPECT_LT(worst(torch::matmul(matrix, matrix.transpose(1, 2)), torch::eye(3, torch::kFloat64)), 1e-14);
@@ -55,7 +55,7 @@ TEST(Rotation, ExactFormHasAFiniteGradientAtZero) {
 }
 
 TEST(Rotation, SmoothLogarithmInvertsTheExactForm) {
-  torch::manual_seed(5);
+  at::manual_seed(5);
   torch::Tensor axis = torch::randn({200, 3}, torch::kFloat64);
   axis = axis / axis.norm(2, 1, true);
   for (const double angle : {0.0, 1e-9, 1e-4, 0.0199, 0.0201, 1.0, 3.0, M_PI - 1e-3, M_PI - 1e-9}) {
