@@ -29,6 +29,13 @@ std::string system_reason() {
   return std::strerror(errno);
 }
 
+// A pickle starts with 0x80 and its protocol, 2 to 5. So may the length of a header, which then starts with a
+// brace.
+bool is_pickle(std::string_view content) {
+  const bool has_header = content.size() > kLengthBytes && content[kLengthBytes] == '{';
+  return content.size() >= 2 && content[0] == '\x80' && content[1] >= 2 && content[1] <= 5 && !has_header;
+}
+
 // Says what the file is if it holds weights in another form, and how they are imported; else "".
 std::string other_form(std::string_view content) {
   constexpr const char* kImport =
@@ -36,10 +43,7 @@ std::string other_form(std::string_view content) {
   if (content.starts_with("PK\3\4")) {
     return fmt::format(fmt::runtime(kImport), "a PyTorch file, such as a Lightning checkpoint (.ckpt)");
   }
-  if (content.starts_with("\x80")) {
-    const bool has_header = content.size() > kLengthBytes && content[kLengthBytes] == '{';
-    if (!has_header) return fmt::format(fmt::runtime(kImport), "a Python pickle (.pkl, .pt, .pth)");
-  }
+  if (is_pickle(content)) return fmt::format(fmt::runtime(kImport), "a Python pickle (.pkl, .pt, .pth)");
   if (content.starts_with("version https://git-lfs")) return "got a Git LFS pointer: run `git lfs pull`";
   return {};
 }

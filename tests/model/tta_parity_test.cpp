@@ -175,13 +175,19 @@ TEST_P(TtaParity, AllInOneBatch) {
   for (std::int64_t i = 0; i < kSamples; ++i) check(got, i);
 }
 
+// A joint's noise is the largest of a few draws, and some joints draw only small ones. The mean of all joints
+// is a better estimate for these.
+torch::Tensor at_least_the_mean(const torch::Tensor& noise) {
+  return torch::maximum(noise, noise.square().mean().sqrt());
+}
+
 // float32 is what users run. Both sides round, and what float64 adds to the golden numbers' distance is
 // small.
 TEST_P(TtaParity, Float32IsNear) {
   const TensorMap exact = adapted(GetParam(), exact_, 0, kSamples);
   const TensorMap single = adapted(GetParam(), testing::parity_prima(std::get<0>(GetParam())), 0, kSamples);
   for (const auto& [name, tensor] : single) {
-    torch::Tensor tolerance = kFloat32Factor * noise().at(name) + few_roundings(tensor);
+    torch::Tensor tolerance = kFloat32Factor * at_least_the_mean(noise().at(name)) + few_roundings(tensor);
     if (name.find("loss") != std::string::npos) tolerance = tolerance + loss_rounding(tensor);
     expect_close(name, tensor, exact.at(name), tolerance);
   }
