@@ -1,6 +1,8 @@
 #include "model/prima.h"
 
+#include <ATen/Parallel.h>
 #include <gtest/gtest.h>
+#include <torch/cuda.h>
 
 #include <fstream>
 #include <stdexcept>

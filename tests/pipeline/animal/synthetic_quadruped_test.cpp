@@ -1,5 +1,6 @@
 #include "pipeline/animal/synthetic_quadruped.h"
 
+#include <ATen/Parallel.h>
 #include <gtest/gtest.h>
 
 #include <map>
