@@ -9,6 +9,7 @@
 #include "manifests/atomic_file.h"
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/options.h"
+#include "pipeline/evaluation/adaptation_figure.h"
 #include "pipeline/evaluation/paper_tables.h"
 #include "pipeline/evaluation/report.h"
 #include "pipeline/run/progress.h"
@@ -35,12 +36,24 @@ void write_paper_tables(const Arguments& arguments, const evaluation::Evaluation
   fmt::print(arguments.json ? stderr : stdout, "\n{}", text);
 }
 
+// The figure of an earlier evaluation does not stay beside tables that it does not show.
+void write_adaptation_figure(const std::filesystem::path& out, const evaluation::Tables& tables) {
+  const std::filesystem::path path = out / "adaptation.svg";
+  const std::string svg = evaluation::adaptation_figure(tables);
+  if (svg.empty()) {
+    std::filesystem::remove(path);
+  } else {
+    manifests::write_file_atomically(path, svg);
+  }
+}
+
 int run(const Arguments& arguments) {
   const auto config = evaluation::load_evaluation_config(arguments.config.files, arguments.checkpoint,
                                                          arguments.config.settings());
   const evaluation::Evaluation result = evaluation::evaluate(config, arguments.options);
   const evaluation::Tables tables = evaluation::make_tables(result);
   evaluation::write_evaluation(arguments.out, result, tables);
+  write_adaptation_figure(arguments.out, tables);
   if (!result.device_warning.empty()) fmt::print(stderr, "warning: {}\n", result.device_warning);
   for (const auto& dataset : result.datasets) {
     for (const std::string& note : dataset.notes) fmt::print(stderr, "note: {}: {}\n", dataset.name, note);
