@@ -2,7 +2,9 @@
 """Says how well each trust score finds bad labels, on pools whose truth is known, and fits the combined score.
 
     tools/trust_scores.py POOL...          a table: each score against the true error of the labels
-    tools/trust_scores.py --fit POOL...    the weights of the combined score, as filters/trust.cpp holds them
+    tools/trust_scores.py --fit POOL...    the weights of the combined score, as filters/trust.cpp holds them: those of
+                                           retained and those of refined labels. A label is good if its error is at most
+                                           what three quarters of the first pool's labels reach
 
 POOL is a folder with labels.csv (of `quadruped3d evaluate-labels --report POOL`) and verdicts.csv (of the build that it
 measured). Labels of the network with a true body count; others are left out.
@@ -55,15 +57,19 @@ SCORES = (
     Score("trust_visible", "trust_visible", -1),
 )
 TRUST = Score("trust", "trust", -1)
-# The terms of the combined score. L_proj of the prediction says more than that of the label, which adaptation has made
-# small whether the body became right or not.
-FITTED = ("trust_mirror", "trust_aux_2d", "trust_aux_3d", "trust_pose_prior", "trust_shape_prior", "initial_error")
+# The terms of the combined score, for each kind of label. Of a refined label, L_proj of the prediction says more than
+# that of the label, which adaptation has made small whether the body became right or not. Of a retained label, no other
+# score added anything to L_proj in cross-validation.
+FITTED = {"retained": ("initial_error",),
+          "refined": ("initial_error", "trust_aux_2d", "gain", "trust_visible")}
 
 
 @dataclass
 class Pool:
     pictures: np.ndarray  # of each label, as numbers
     error: np.ndarray  # PA-MPJPE in mm
+    names: list[str]  # ids
+    kinds: np.ndarray  # "retained" or "refined"
     columns: dict[str, np.ndarray]
 
     def values(self, score: Score) -> np.ndarray:
@@ -101,8 +107,8 @@ def read_pool(folder: pathlib.Path) -> Pool:
     # What was retained was not adapted: it has gained nothing.
     columns["gain"] = np.where(np.isfinite(columns["gain"]), columns["gain"], 0.0)
     names = [name.rsplit("#", 1)[0] for name in kept]
-    return Pool(np.unique(names, return_inverse=True)[1], np.array([number(truth[name][ERROR]) for name in kept]),
-                columns)
+    return Pool(np.unique(names, return_inverse=True)[1], np.array([number(truth[name][ERROR]) for name in kept]), kept,
+                np.array([verdicts[name]["verdict"] for name in kept]), columns)
 
 
 def ranks(values: np.ndarray) -> np.ndarray:
@@ -201,20 +207,17 @@ def table(pools: Sequence[Pool], resamples: int = RESAMPLES, seed: int = 0) -> s
 
 @dataclass
 class Fit:
+    kind: str
+    labels: int
     bias: float
     terms: list[tuple[str, float, float, float]]  # column, mean, deviation, weight
 
 
-def fit(pools: Sequence[Pool], columns: Sequence[str] = FITTED, penalty: float = 1.0) -> Fit:
-    """Logistic regression of "not among the worst quarter of its pool" on the standardised scores, by Newton's method.
-    `penalty` is that of the squared weights, without the bias."""
-    scores = [next(score for score in SCORES if score.column == column) for column in columns]
-    raw = np.concatenate([np.stack([pool.values(score) * score.bad_is for score in scores], 1) for pool in pools])
-    good = np.concatenate([~worst_quarter(pool.error) for pool in pools]).astype(float)
-    mean, deviation = raw.mean(0), np.maximum(raw.std(0), 1e-9)
-    inputs = np.concatenate([np.ones((len(raw), 1)), (raw - mean) / deviation], 1)
+def logistic_regression(inputs: np.ndarray, good: np.ndarray, penalty: float) -> np.ndarray:
+    """The bias and the weights, by Newton's method. `penalty` is that of the squared weights, without the bias."""
+    inputs = np.concatenate([np.ones((len(inputs), 1)), inputs], 1)
     weights = np.zeros(inputs.shape[1])
-    ridge = penalty * np.diag([0.0] + [1.0] * len(scores))
+    ridge = penalty * np.diag([0.0] + [1.0] * (len(weights) - 1))
     for _ in range(50):
         chance = 1 / (1 + np.exp(-inputs @ weights))
         gradient = inputs.T @ (good - chance) - ridge @ weights
@@ -223,12 +226,42 @@ def fit(pools: Sequence[Pool], columns: Sequence[str] = FITTED, penalty: float =
         weights += step
         if np.abs(step).max() < 1e-10:
             break
-    return Fit(float(weights[0]), [(column, float(m), float(d), float(w))
-                                   for column, m, d, w in zip(columns, mean, deviation, weights[1:])])
+    return weights
+
+
+def good_bound(pools: Sequence[Pool]) -> float:
+    """The error in mm that three quarters of the first pool's labels reach: at most this is good."""
+    return float(np.quantile(pools[0].error, 1 - WORST))
+
+
+def chosen_labels(pools: Sequence[Pool], kind: str) -> list[np.ndarray]:
+    """Of each pool the labels of the kind, without those that an earlier pool has: two builds of one pool share many."""
+    seen: set[str] = set()
+    chosen = []
+    for pool in pools:
+        chosen.append(np.array([k for k in np.flatnonzero(pool.kinds == kind) if pool.names[k] not in seen], dtype=int))
+        seen.update(pool.names[k] for k in chosen[-1])
+    return chosen
+
+
+def fit(pools: Sequence[Pool], kind: str, penalty: float = 1.0) -> Fit:
+    """Logistic regression of "the label is good" on the standardised scores of the labels of one kind."""
+    scores = [next(score for score in SCORES if score.column == column) for column in FITTED[kind]]
+    chosen = chosen_labels(pools, kind)
+    raw = np.concatenate([np.stack([pool.values(score)[own] * score.bad_is for score in scores], 1)
+                          for pool, own in zip(pools, chosen)])
+    if len(raw) < 20:
+        raise SystemExit(f"{len(raw)} {kind} labels with a true body, expected 20 or more to fit their trust")
+    good = np.concatenate([pool.error[own] <= good_bound(pools) for pool, own in zip(pools, chosen)]).astype(float)
+    mean, deviation = raw.mean(0), np.maximum(raw.std(0), 1e-9)
+    weights = logistic_regression((raw - mean) / deviation, good, penalty)
+    return Fit(kind, len(raw), float(weights[0]), [(column, float(m), float(d), float(w))
+                                   for column, m, d, w in zip(FITTED[kind], mean, deviation, weights[1:])])
 
 
 def describe(result: Fit) -> str:
-    lines = [f"bias {result.bias:.4g}", "column, mean, deviation, weight of the log odds (logarithms where is_log):"]
+    lines = [f"{result.kind}: {result.labels} labels, bias {result.bias:.4g}",
+             "  column, mean, deviation, weight of the log odds (of the logarithm where is_log):"]
     lines += [f"  {column:<18} {mean:8.4g} {deviation:8.4g} {weight:+8.4g}" for column, mean, deviation, weight in
               result.terms]
     return "\n".join(lines)
@@ -242,7 +275,11 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("pools", nargs="+", type=pathlib.Path, metavar="POOL")
     options = parser.parse_args(arguments)
     pools = [read_pool(folder) for folder in options.pools]
-    print(describe(fit(pools)) if options.fit else table(pools, options.resamples, options.seed))
+    if options.fit:
+        print(f"good: at most {good_bound(pools):.1f} mm")
+        print("\n".join(describe(fit(pools, kind)) for kind in FITTED))
+    else:
+        print(table(pools, options.resamples, options.seed))
     return 0
 
 

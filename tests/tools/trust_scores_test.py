@@ -41,7 +41,7 @@ class Pools(unittest.TestCase):
         self.folder = pathlib.Path(scratch.name)
 
     def write_pool(self, name, seed, count=240):
-        """The mirror score knows the error, aux_2d knows it a little, everything else is noise."""
+        """The mirror score and L_proj of the prediction know the error, aux_2d knows it a little, all else is noise."""
         generator = np.random.default_rng(seed)
         error = generator.uniform(50, 150, count)
         folder = self.folder / name
@@ -55,6 +55,7 @@ class Pools(unittest.TestCase):
             for i in range(count):
                 row = {column: generator.uniform(0.1, 1) for column in columns}
                 row |= {"trust_mirror": error[i] * generator.uniform(0.9, 1.1), "trust_mask": "",
+                        "initial_error": error[i] * generator.uniform(0.9, 1.1),
                         "trust_aux_2d": error[i] * generator.uniform(0.3, 1.7), "trust": 1 / error[i], "gain": ""}
                 rows.writerow({"id": f"a/b/p{i // 2}.png#{i}", "verdict": ("retained", "refined")[i % 2], **row})
                 truth.writerow([f"a/b/p{i // 2}.png#{i}", "", error[i]])
@@ -84,15 +85,29 @@ class Pools(unittest.TestCase):
         self.assertAlmostEqual(float(half[2]), 75, delta=3)
         self.assertLess(float(half[3].split("to")[1].rstrip(") |")), 0, "the interval lies below 0")
 
-    def test_the_fit_finds_the_score_that_knows(self):
-        pools = [trust_scores.read_pool(self.write_pool(str(seed), seed)) for seed in (1, 2, 3)]
-        result = trust_scores.fit(pools)
-        weights = {column: weight for column, _, _, weight in result.terms}
-        self.assertLess(weights["trust_mirror"], -2)
-        self.assertLess(abs(weights["trust_pose_prior"]), 0.5)
-        self.assertGreater(result.bias, 0, "three quarters are good")
-        mean = next(term[1] for term in result.terms if term[0] == "trust_mirror")
-        self.assertAlmostEqual(mean, np.mean([np.log(pool.columns["trust_mirror"]).mean() for pool in pools]), places=2)
+    def test_the_fit_finds_the_scores_that_know(self):
+        pool = trust_scores.read_pool(self.write_pool("one", 1))
+        retained, refined = trust_scores.fit([pool], "retained"), trust_scores.fit([pool], "refined")
+        self.assertEqual([term[0] for term in retained.terms], ["initial_error"])
+        self.assertLess(retained.terms[0][3], -2, "a large error speaks against the label")
+        weights = {column: weight for column, _, _, weight in refined.terms}
+        self.assertLess(weights["initial_error"], -2)
+        self.assertLess(abs(weights["trust_visible"]), 0.7)
+        self.assertGreater(refined.bias, 0, "three quarters are good")
+        own = pool.kinds == "refined"
+        mean = next(term[1] for term in refined.terms if term[0] == "initial_error")
+        self.assertAlmostEqual(mean, np.log(pool.columns["initial_error"][own]).mean(), places=9)
+
+    def test_a_label_of_two_pools_counts_once(self):
+        pools = [trust_scores.read_pool(self.write_pool(str(seed), seed)) for seed in (1, 2)]
+        alone, both = trust_scores.fit(pools[:1], "retained"), trust_scores.fit(pools, "retained")
+        self.assertEqual(both.labels, 120)
+        self.assertEqual(both.terms, alone.terms)
+
+    def test_a_fit_needs_labels_of_the_kind(self):
+        pool = trust_scores.read_pool(self.write_pool("one", 1, count=24))
+        with self.assertRaisesRegex(SystemExit, "12 retained labels"):
+            trust_scores.fit([pool], "retained")
 
     def test_a_folder_without_labels_is_refused(self):
         folder = self.write_pool("few", 1, count=3)

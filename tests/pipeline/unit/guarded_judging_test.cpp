@@ -145,28 +145,30 @@ TEST(GuardedJudging, OneKeypointCannotBeHeldOut) {
   EXPECT_EQ(unit.judge().initial_error, 0.25);
 }
 
-TEST(GuardedJudging, LabelsThatAreTrustedTooLittleAreDiscarded) {
+// A retained label with this L_proj, after its scores were measured.
+manifests::Judgement measured_judgement(float error, double min_trust) {
   GivenUnit unit;
-  unit.add(10, 0.1F);
+  unit.add(10, error);
+  unit.rules.min_trust = min_trust;
   EXPECT_TRUE(std::isnan(unit.judge().trust.combined)) << "not measured yet";
-  unit.rules.min_trust = 0.5;
   EXPECT_EQ(unit.judge().verdict, Verdict::retained) << "nothing is known against it";
   MeasuredLabel& label = unit.work.measured.emplace().emplace_back();
   label.scores.visible = 10;
-  label.scores.mirror = 1.0;
-  label.scores.aux_2d = 0.001;
-  EXPECT_EQ(unit.judge().verdict, Verdict::retained);
-  const double good = unit.judge().trust.combined;
-  EXPECT_GT(good, 0.5);
-  EXPECT_LE(good, 1.0);
   label.scores.mirror = 1000.0;
-  label.scores.aux_2d = 0.5;
-  EXPECT_EQ(unit.judge().verdict, Verdict::discarded);
-  EXPECT_EQ(unit.judge().reason, Reason::trust_too_low);
-  EXPECT_LT(unit.judge().trust.combined, 0.5);
-  EXPECT_EQ(unit.judge().trust.mirror, 1000.0) << "the scores stay";
-  unit.rules.min_trust = 0.0;
-  EXPECT_EQ(unit.judge().verdict, Verdict::retained) << "off";
+  return unit.judge();
+}
+
+TEST(GuardedJudging, LabelsThatAreTrustedTooLittleAreDiscarded) {
+  const manifests::Judgement good = measured_judgement(0.03F, 0.5);
+  EXPECT_EQ(good.verdict, Verdict::retained);
+  EXPECT_GT(good.trust.combined, 0.5);
+  EXPECT_LE(good.trust.combined, 1.0);
+  const manifests::Judgement bad = measured_judgement(0.1F, 0.5);
+  EXPECT_EQ(bad.verdict, Verdict::discarded);
+  EXPECT_EQ(bad.reason, Reason::trust_too_low);
+  EXPECT_LT(bad.trust.combined, 0.5);
+  EXPECT_EQ(bad.trust.mirror, 1000.0) << "the scores stay";
+  EXPECT_EQ(measured_judgement(0.1F, 0.0).verdict, Verdict::retained) << "off";
 }
 
 TEST(GuardedJudging, RetainedPredictionsAreAdaptedOnRequest) {
