@@ -40,6 +40,12 @@ torch::Tensor read(const smal::tensors::SafeTensors& file, const std::string& na
   return values;
 }
 
+// (B, families): the squares of the betas whitened by each family's statistics.
+torch::Tensor shape_squares(const Priors& priors, const torch::Tensor& betas) {
+  const torch::Tensor deviation = betas.unsqueeze(1) - priors.mean_betas;  // (B, families, 41)
+  return torch::einsum("bfi,fij->bfj", {deviation, priors.betas_prec}).square().sum(2);
+}
+
 }  // namespace
 
 Priors load_priors(const smal::tensors::SafeTensors& file, torch::Device device) {
@@ -66,18 +72,23 @@ void save_priors(const std::filesystem::path& path, const Priors& priors) {
                                           {kMeanBetas, priors.mean_betas}});
 }
 
+torch::Tensor pose_squares(const Priors& priors, const torch::Tensor& pose) {
+  return ((pose - priors.mean_pose).matmul(priors.precs) * priors.use_index).square().sum(1);
+}
+
+torch::Tensor nearest_shape_squares(const Priors& priors, const torch::Tensor& betas) {
+  return std::get<0>(shape_squares(priors, betas).min(1));
+}
+
 PartialMean pose_prior(const Priors& priors, const torch::Tensor& pose, const torch::Tensor& has_pose) {
   const torch::Tensor missing = 1.0 - has_pose;
-  const torch::Tensor whitened = (pose - priors.mean_pose).matmul(priors.precs) * priors.use_index;
-  return {(whitened.square().sum(1) * missing).sum(), missing.sum() * kPoseNumbers};
+  return {(pose_squares(priors, pose) * missing).sum(), missing.sum() * kPoseNumbers};
 }
 
 PartialMean shape_prior(const Priors& priors, const torch::Tensor& betas, const torch::Tensor& family,
                         const torch::Tensor& has_betas) {
   const torch::Tensor missing = 1.0 - has_betas;
-  const torch::Tensor deviation = betas.unsqueeze(1) - priors.mean_betas;  // (B, families, 41)
-  const torch::Tensor whitened = torch::einsum("bfi,fij->bfj", {deviation, priors.betas_prec});
-  const torch::Tensor distance = whitened.square().sum(2);  // (B, families)
+  const torch::Tensor distance = shape_squares(priors, betas);
   const torch::Tensor known = distance.gather(1, family.clamp_min(0).unsqueeze(1)).squeeze(1);
   const torch::Tensor nearest = std::get<0>(distance.min(1));
   return {(torch::where(family >= 0, known, nearest) * missing).sum(), missing.sum() * kBetas};

@@ -25,6 +25,13 @@ Priors load_priors(const smal::tensors::SafeTensors& file, torch::Device device)
 // Writes such a file. Throws std::runtime_error.
 void save_priors(const std::filesystem::path& path, const Priors& priors);
 
+// Per sample (B): the squares of the whitened pose, summed over its 105 numbers; those of the global
+// orientation count as zeros. pose (B, 105) rad.
+torch::Tensor pose_squares(const Priors& priors, const torch::Tensor& pose);
+// Per sample (B): the squares of the whitened betas, summed over the 41, by the statistics of the nearest
+// family. betas (B, 41).
+torch::Tensor nearest_shape_squares(const Priors& priors, const torch::Tensor& betas);
+
 // Mean square of the whitened pose over samples without true pose, the three numbers of the global
 // orientation counted as zeros. pose (B, 105) rad, has_pose (B) of 0 and 1.
 PartialMean pose_prior(const Priors& priors, const torch::Tensor& pose, const torch::Tensor& has_pose);

@@ -47,6 +47,26 @@ torch::Tensor objective(const TtaOptions& options, const torch::Tensor& projecte
          options.reproj_weight * mean_absolute_error(projected, targets, targets.fitted);
 }
 
+// Per instance (B): the weighted mean squares of the whitened pose and betas.
+torch::Tensor prior_terms(const TtaOptions& options, const DecoderOutput& output) {
+  torch::Tensor terms = torch::zeros({output.betas.size(0)}, output.betas.options());
+  if (options.pose_prior_weight > 0.0) {
+    const torch::Tensor pose =
+        smal::tensors::matrix_to_axis_angle_smooth(pose_rotations(output.pose_6d)).flatten(1);
+    const double mean = options.pose_prior_weight / static_cast<double>(pose.size(1));
+    terms = terms + mean * pose_squares(*options.priors, pose);
+  }
+  if (options.shape_prior_weight > 0.0) {
+    const double mean = options.shape_prior_weight / static_cast<double>(kBetas);
+    terms = terms + mean * nearest_shape_squares(*options.priors, output.betas);
+  }
+  return terms;
+}
+
+bool uses_priors(const TtaOptions& options) {
+  return options.pose_prior_weight > 0.0 || options.shape_prior_weight > 0.0;
+}
+
 KeypointTargets make_targets(const torch::Tensor& keypoints, const std::vector<Schedule>& schedules,
                              torch::TensorOptions options) {
   torch::Tensor held_out = torch::zeros({keypoints.size(0), kKeypoints, 1}, options.device(torch::kCPU));
@@ -103,6 +123,10 @@ void check_arguments(const Prima& prima, const ImageFeatures& features, const to
   check_held_out(keypoints, schedules);
   require(std::isfinite(options.learning_rate) && options.learning_rate >= 0.0,
           fmt::format("learning rate {}", options.learning_rate));
+  for (const double weight : {options.pose_prior_weight, options.shape_prior_weight}) {
+    require(std::isfinite(weight) && weight >= 0.0, fmt::format("a prior's weight {}", weight));
+  }
+  require(!uses_priors(options) || options.priors, "prior terms without priors");
   require(std::is_sorted(options.snapshots.begin(), options.snapshots.end()) &&
               (options.snapshots.empty() || options.snapshots.front() >= 0),
           "snapshots must be ascending and 0 or more");
@@ -194,6 +218,7 @@ class Adaptation {
     const KeypointTargets targets = slots_.targets();
     Iterate iterate;
     iterate.loss = objective(options_, projected, output.aux_keypoints_2d, targets);
+    if (uses_priors(options_)) iterate.loss = iterate.loss + prior_terms(options_, output);
     const at::NoGradGuard no_grad;
     iterate.l_proj = mean_absolute_error(projected, targets, targets.visible);
     iterate.held_out = holds_out_ ? mean_absolute_error(projected, targets, targets.held_out)

@@ -6,11 +6,13 @@
 
 #include <torch/types.h>
 
+#include <optional>
 #include <vector>
 
 #include "filters/adaptation/schedule.h"
 #include "model/decoder.h"
 #include "model/prima.h"
+#include "model/priors.h"
 
 namespace q3d::model {
 
@@ -24,6 +26,11 @@ struct TtaOptions {
   double learning_rate = 1e-6;
   double aux_weight = 5.0;
   double reproj_weight = 0.5;
+  // Weights of the mean squares of the whitened pose and of the whitened betas, which the paper's objective
+  // lacks. With a weight above 0, `priors` is needed, on the network's device.
+  double pose_prior_weight = 0.0;
+  double shape_prior_weight = 0.0;
+  std::optional<Priors> priors;
   std::vector<int> snapshots;  // iterates to keep beside the best and the last; ascending
 };
 

@@ -68,7 +68,7 @@ Workspace::Workspace(const config::BuildConfig& config, const run::RunOptions& o
 
 device::Network& Workspace::network() {
   if (!network_) {
-    network_ = network::load_network(config_.network, config_.tta);
+    network_ = network::load_network(config_.network, config_.tta, config::priors_file(config_));
     if (!network_->device_warning().empty()) run::log_warning(network_->device_warning());
     if (!options_.quiet) run::log_info("network on " + network_->device_description());
   }

@@ -296,6 +296,10 @@ bool needs_network(const BuildConfig& config) {
                      [](const DatasetConfig& dataset) { return dataset.role == Role::pseudo; });
 }
 
+bool uses_priors(const TtaConfig& tta) {
+  return tta.pose_prior_weight > 0.0 || tta.shape_prior_weight > 0.0;
+}
+
 bool uses_priors(const GuardConfig& guards) {
   return guards.pose_deviation_max > 0.0 || guards.limb_factor_max > 0.0;
 }

@@ -51,6 +51,8 @@ struct TtaConfig {
   double learning_rate = 1e-6;
   double aux_weight = 5.0;
   double reproj_weight = 0.5;
+  double pose_prior_weight = 0.0;  // of either objective; above 0 the priors are needed
+  double shape_prior_weight = 0.0;
   int iterations_min = 10;
   int iterations_max = 60;
   double stop_below = 0.0;       // crop units; 0 = never
@@ -147,6 +149,8 @@ void require_keypoints(const BuildConfig& config);
 // `filter` and `guards`.
 bool needs_network(const BuildConfig& config);
 
+// Whether adaptation's objective has a term of the pose or shape priors.
+bool uses_priors(const TtaConfig& tta);
 // Whether a guard that is on needs the pose and shape priors.
 bool uses_priors(const GuardConfig& guards);
 // The file that holds them: the guards' own, else the checkpoint, whose official form holds them too.

@@ -54,8 +54,10 @@ const Settings<BuildConfig>& build_settings() {
       {.key = "profile",
        .member = &BuildConfig::profile,
        .description =
-           "the set of guards that the config starts from: `paper` has none (the paper's rule alone), "
-           "`strict` has five. See [guards](#guards)",
+           "the layer that the config starts from: `paper` is empty (the paper's rule alone). `strict` "
+           "adapts every "
+           "prediction that is kept (`tta.refine_retained`) and discards labels that are trusted little "
+           "(`filter.min_trust` 0.8), which made labels more accurate on rendered worlds (docs/results.md)",
        .words = profile_names()},
       {.key = "veto",
        .member = &BuildConfig::veto,
@@ -245,6 +247,18 @@ const Settings<TtaConfig>& tta_settings() {
       {.key = "reproj_weight",
        .member = &TtaConfig::reproj_weight,
        .description = "weight of the reprojection error in the `paper` objective",
+       .decides = DecidedStage::refine},
+      {.key = "pose_prior_weight",
+       .member = &TtaConfig::pose_prior_weight,
+       .description =
+           "weight of the mean square of the whitened pose, which keeps poses near those that animals take. "
+           "The paper has no such term. Needs priors (`guards.priors`)",
+       .range = kNotNegative,
+       .decides = DecidedStage::refine},
+      {.key = "shape_prior_weight",
+       .member = &TtaConfig::shape_prior_weight,
+       .description = "the same for the betas, by the statistics of the nearest family",
+       .range = kNotNegative,
        .decides = DecidedStage::refine},
       {.key = "iterations_min",
        .member = &TtaConfig::iterations_min,

@@ -1,4 +1,4 @@
-// Named sets of guards: `"profile": "strict"` in a config.
+// Named layers under a config: `"profile": "strict"`.
 #pragma once
 
 #include <nlohmann/json.hpp>

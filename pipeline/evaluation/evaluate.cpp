@@ -89,7 +89,7 @@ Evaluation evaluate(const EvaluationConfig& config, const EvaluationOptions& opt
   std::unique_ptr<device::BodyMeshes> meshes;
   device::DeviceWorker device;  // ends before what it works on
   device.run([&] {
-    network = network::load_network(config.network, config.tta);
+    network = network::load_network(config.network, config.tta, config.priors);
     meshes = network::load_body_meshes(config.network.smal_asset);
   });
   evaluation.device = network->device_description();

@@ -17,6 +17,7 @@ void resolve_paths(json& config, const fs::path& folder) {
     config::resolve_path(config["network"], "checkpoint", folder);
     config::resolve_path(config["network"], "smal_asset", folder);
   }
+  if (config.contains("guards")) config::resolve_path(config["guards"], "priors", folder);
   config::resolve_dataset_paths(config, "datasets", folder);
   if (!config.contains("datasets") || !config["datasets"].is_array()) return;
   for (json& dataset : config["datasets"]) {
@@ -67,6 +68,7 @@ EvaluationConfig load_evaluation_config(const std::vector<fs::path>& files, cons
   for (std::size_t i = 0; i < config.datasets.size(); ++i) config.datasets[i].source = parsed.datasets[i];
   config.network = parsed.network;
   config.tta = parsed.tta;
+  config.priors = config::priors_file(parsed);
   config.as_written = std::move(layers.as_written);
   return config;
 }

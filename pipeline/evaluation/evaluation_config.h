@@ -21,7 +21,8 @@ struct EvaluationConfig {
   std::vector<EvaluatedDataset> datasets;
   config::NetworkConfig network;
   config::TtaConfig tta;
-  nlohmann::json as_written;  // the merged JSON, paths as the user wrote them
+  std::filesystem::path priors;  // guards.priors, else the checkpoint; read if tta has a term of them
+  nlohmann::json as_written;     // the merged JSON, paths as the user wrote them
 };
 
 // Reads the files in order; a later file's keys replace an earlier one's. Relative paths are relative to the

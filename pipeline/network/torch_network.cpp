@@ -89,12 +89,15 @@ model::TtaOptions tta_options(const config::TtaConfig& tta) {
   options.learning_rate = tta.learning_rate;
   options.aux_weight = tta.aux_weight;
   options.reproj_weight = tta.reproj_weight;
+  options.pose_prior_weight = tta.pose_prior_weight;
+  options.shape_prior_weight = tta.shape_prior_weight;
   return options;
 }
 
 class TorchNetwork : public device::Network {
  public:
-  TorchNetwork(const config::NetworkConfig& network, const config::TtaConfig& tta)
+  TorchNetwork(const config::NetworkConfig& network, const config::TtaConfig& tta,
+               const std::filesystem::path& priors)
       : threads_(compute_threads(network)),
         predict_batch_(static_cast<std::size_t>(network.batch)),
         adapt_batch_(static_cast<std::size_t>(tta.batch)),
@@ -102,7 +105,11 @@ class TorchNetwork : public device::Network {
         device_(choose_device(network.device, threads_)),
         prima_(model::Prima::load(
             network.checkpoint, network.smal_asset, device_.device,
-            network.dtype == config::Dtype::bfloat16 ? torch::kBFloat16 : torch::kFloat32)) {}
+            network.dtype == config::Dtype::bfloat16 ? torch::kBFloat16 : torch::kFloat32)) {
+    if (config::uses_priors(tta)) {
+      options_.priors = model::load_priors(smal::tensors::SafeTensors::open(priors), device_.device);
+    }
+  }
 
   std::vector<device::BodyPrediction> predict(std::span<const device::PatchView> patches) override;
   std::vector<device::AdaptOutcome> adapt(std::span<const device::AdaptRequest> requests,
@@ -178,8 +185,9 @@ std::vector<device::AdaptOutcome> TorchNetwork::adapt(std::span<const device::Ad
 }  // namespace
 
 std::unique_ptr<device::Network> load_network(const config::NetworkConfig& network,
-                                              const config::TtaConfig& tta) {
-  return std::make_unique<TorchNetwork>(network, tta);
+                                              const config::TtaConfig& tta,
+                                              const std::filesystem::path& priors) {
+  return std::make_unique<TorchNetwork>(network, tta, priors);
 }
 
 int compute_threads(const config::NetworkConfig& network) {

@@ -12,10 +12,11 @@
 
 namespace q3d::pipeline::network {
 
-// Loads checkpoint and SMAL asset. Throws std::runtime_error (weights, asset, device) or ConfigError (device
-// name).
+// Loads checkpoint and SMAL asset, and the file of priors if adaptation's objective has a term of them.
+// Throws std::runtime_error (weights, asset, priors, device) or ConfigError (device name).
 std::unique_ptr<device::Network> load_network(const config::NetworkConfig& network,
-                                              const config::TtaConfig& tta);
+                                              const config::TtaConfig& tta,
+                                              const std::filesystem::path& priors);
 
 // A checkpoint below this size is that of a small network: its operators are too short to share.
 inline constexpr std::uintmax_t kSmallCheckpointBytes = std::uintmax_t{64} << 20U;

@@ -109,7 +109,8 @@ AssetDigests digest_assets(const config::BuildConfig& config, manifests::DigestC
   if (!config::needs_network(config)) return {};
   AssetDigests assets{
       digests.digest(config.network.checkpoint), digests.digest(config.network.smal_asset), {}};
-  if (config::uses_priors(config.guards) || !config.guards.priors.empty()) {
+  if (config::uses_priors(config.guards) || config::uses_priors(config.tta) ||
+      !config.guards.priors.empty()) {
     assets.priors = digests.digest(config::priors_file(config));
   }
   return assets;
@@ -146,6 +147,7 @@ StageKeys keys_of_config(const config::BuildConfig& config, const config::Judgin
   keys.fidelity = key_of("fidelity", kFidelityCode, std::move(fidelity));
   json refine = judges ? refine_parts(config.tta, config.guards) : json::object();
   refine["fidelity"] = keys.fidelity;
+  if (config::uses_priors(config.tta)) refine["priors"] = assets.priors;
   keys.refine = key_of("refine", kRefineCode, std::move(refine));
   json shards = config::key_parts(config::shard_settings(), config.shards, config::DecidedStage::shards);
   shards.update({{"refine", keys.refine}, {"schema", manifests::kShardSchema}, {"name", config.name}});

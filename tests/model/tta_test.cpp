@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "model/net.h"
+#include "smal/tensors/rotation.h"
 #include "tests/model/parity_net.h"
 
 namespace q3d::model {
@@ -320,6 +321,48 @@ TEST_F(Tta, ExplodingStepsKeepTheLastFiniteIterate) {
   expect_near(result.best.rotations, before.rotations, 1e-5);
 }
 
+// Priors that know nothing but their means: no pose and the betas of one family, each with unit variance.
+Priors unit_priors() {
+  Priors priors;
+  priors.mean_pose = torch::zeros({kPose6d / 2});
+  priors.precs = torch::eye(kPose6d / 2);
+  priors.use_index = torch::ones({kPose6d / 2});
+  priors.mean_betas = torch::full({1, kBetas}, 0.5);
+  priors.betas_prec = torch::eye(kBetas).unsqueeze(0);
+  return priors;
+}
+
+TEST_F(Tta, PriorTermsAreMeanSquaresOfPoseAndBetas) {
+  TtaOptions options = fast();
+  options.priors = unit_priors();
+  const auto first_loss = [&] {
+    return torch::tensor(
+               adapt(samples_->prima, samples_->features, samples_->keypoints, all(steps(0)), options).loss)
+        .flatten();
+  };
+  const torch::Tensor without = first_loss();
+  options.pose_prior_weight = 2.0;
+  options.shape_prior_weight = 3.0;
+  const torch::Tensor with = first_loss();
+  const Prediction before = samples_->prima.predict(samples_->features);
+  const torch::Tensor pose = smal::tensors::matrix_to_axis_angle_smooth(before.rotations).flatten(1);
+  const torch::Tensor by_hand = 2.0 * pose.square().mean(1) + 3.0 * (before.betas - 0.5).square().mean(1);
+  expect_near(with - without, by_hand.to(torch::kFloat64), 1e-4);
+}
+
+TEST_F(Tta, PriorTermsPullTheBodyTowardsTheirMeans) {
+  TtaOptions options = fast();
+  options.priors = unit_priors();
+  const auto pose_size = [&] {
+    const TtaResult result =
+        adapt(samples_->prima, samples_->features, samples_->keypoints, all(steps(10)), options);
+    return smal::tensors::matrix_to_axis_angle_smooth(result.last.rotations).square().mean().item<double>();
+  };
+  const double without = pose_size();
+  options.pose_prior_weight = 10.0;
+  EXPECT_LT(pose_size(), 0.99 * without);
+}
+
 TEST_F(Tta, LeavesTheNetworkAsItWas) {
   std::vector<torch::Tensor> before;
   for (const auto& parameter : samples_->prima.net().parameters()) before.push_back(parameter.clone());
@@ -344,6 +387,11 @@ TEST_F(Tta, WrongArgumentsAreRefused) {
   options.learning_rate = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THROW(adapt(samples_->prima, samples_->features, keypoints, all(steps(1)), options),
                std::invalid_argument);
+  options = fast();
+  options.pose_prior_weight = 1.0;
+  EXPECT_THROW(adapt(samples_->prima, samples_->features, keypoints, all(steps(1)), options),
+               std::invalid_argument)
+      << "no priors";
   samples_->prima.net().train();
   EXPECT_THROW(run(keypoints, all(steps(1))), std::invalid_argument);
   samples_->prima.net().eval();

@@ -264,21 +264,23 @@ class Guards(Case):
 
     def test_strict(self):
         self.go_on_in_a_copy()
-        strict = {"profile": "strict", "guards": self.with_priors({})}
+        # This network has learnt nothing, so all of its labels are trusted too little.
+        strict = {"profile": "strict", "guards": self.with_priors({}), "filter": {"min_trust": 1e-12}}
         summary = self.build("strict", **strict)
         self.assertEqual(len(self.stages("predict")), 1)
         described = json.loads((self.datasets["strict"] / "dataset.json").read_text())
         self.assertEqual(described["profile"], "strict")
-        shown = json.loads(run("config", "show").stdout)["profiles"]["strict"]["guards"]
-        self.assertEqual({key: described["guards"][key] for key in shown}, shown)
+        shown = json.loads(run("config", "show").stdout)["profiles"]["strict"]
+        self.assertEqual(shown, {"tta": {"refine_retained": True}, "filter": {"min_trust": 0.8}})
         self.assertEqual(described["provenance"]["config"]["profile"], "strict")
         self.assertEqual(described["provenance"]["priors_sha256"], file_sha256(self.shared / "priors.safetensors"))
         rows = self.verdicts("strict").values()
         self.assertEqual(len(kept(rows)), summary["retained"] + summary["refined"])
         self.assertEqual(summary["retained"] + summary["refined"] + summary["discarded"] + summary["failed"], len(rows))
-        for row in rows:
+        for row in kept(rows):
+            self.assertTrue(float(row["trust"]) >= 1e-12)
             if row["verdict"] == "refined":
-                self.assertGreater(int(row["best_iteration"]), 0, "the kept iterate helps the held-out points")
+                self.assertGreater(int(row["best_iteration"]), 0, "the kept iterate is better")
         run("verify", self.datasets["strict"])
         for out, threads in (("one", 1), ("two", 4)):
             self.build("again", out=self.folder / out, threads=threads, **strict)

@@ -324,8 +324,7 @@ TEST(BuildConfig, TheShippedConfigsOfTheWorldAreSound) {
   const BuildConfig strict =
       load_build_config({configs / "world_stage2.json", configs / "world_strict.json"});
   EXPECT_EQ(strict.profile, "strict");
-  EXPECT_EQ(strict.guards.held_out_share, 0.0);  // it shortens adaptation, which makes labels worse
-  EXPECT_GT(strict.guards.pose_deviation_max, 0.0);
+  EXPECT_TRUE(strict.tta.refine_retained);
   EXPECT_EQ(strict.guards.priors.parent_path(),
             std::filesystem::weakly_canonical(configs / "../data/world/assets"));
 }
@@ -445,20 +444,21 @@ TEST(Profiles, PaperIsTheRuleAloneAndTheDefault) {
   EXPECT_EQ(effective_config(parse_build_config(config, "t")), effective_config(paper));
 }
 
-TEST(Profiles, StrictBoundsLabelsAndTheConfigIsLaidOverIt) {
+TEST(Profiles, StrictRefinesAllAndTheConfigIsLaidOverIt) {
   json config = good();
   config["profile"] = "strict";
-  config["guards"] = {{"visible_min", 3}, {"mask_iou_min", 0}};
+  config["tta"]["batch"] = 3;
   const BuildConfig strict = parse_build_config(config, "t");
   EXPECT_EQ(strict.profile, "strict");
-  EXPECT_EQ(strict.guards.visible_min, 3);
-  EXPECT_EQ(strict.guards.mask_iou_min, 0.0);
-  const json& layer = profile_layer("strict").at("guards");
-  EXPECT_EQ(strict.guards.pose_deviation_max, layer.at("pose_deviation_max").get<double>());
-  for (const char* key :
-       {"visible_min", "pose_deviation_max", "limb_factor_max", "left_right_max", "mask_iou_min"}) {
-    EXPECT_GT(layer.at(key).get<double>(), 0.0) << key;
-  }
+  EXPECT_TRUE(strict.tta.refine_retained);
+  EXPECT_EQ(strict.tta.batch, 3) << "what the config says stays";
+  EXPECT_EQ(judging_rules(strict).min_trust,
+            profile_layer("strict").at("filter").at("min_trust").get<double>());
+  config["tta"]["refine_retained"] = false;
+  config["filter"]["min_trust"] = 0.25;
+  const BuildConfig overlaid = parse_build_config(config, "t");
+  EXPECT_FALSE(overlaid.tta.refine_retained);
+  EXPECT_EQ(judging_rules(overlaid).min_trust, 0.25);
 }
 
 TEST(EffectiveConfig, SaysEverythingAndReadsAsTheSameConfig) {
@@ -466,7 +466,7 @@ TEST(EffectiveConfig, SaysEverythingAndReadsAsTheSameConfig) {
   config["profile"] = "strict";
   config["filter"]["datasets"]["b"] = {{"delta", 0.2}};
   const auto effective = effective_config(parse_build_config(config, "t"));
-  EXPECT_EQ(effective["guards"]["visible_min"], 5);
+  EXPECT_EQ(effective["tta"]["refine_retained"], true);
   EXPECT_EQ(effective["filter"]["datasets"]["b"]["delta"], 0.2);
   EXPECT_EQ(effective["network"]["batch"], 4);
   const json again = json::parse(effective.dump());
