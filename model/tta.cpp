@@ -11,6 +11,7 @@
 #include "model/assemble.h"
 #include "model/net.h"
 #include "model/tta_slots.h"
+#include "smal/tensors/rotation.h"
 
 namespace q3d::model {
 namespace {

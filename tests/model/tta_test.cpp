@@ -336,9 +336,11 @@ TEST_F(Tta, PriorTermsAreMeanSquaresOfPoseAndBetas) {
   TtaOptions options = fast();
   options.priors = unit_priors();
   const auto first_loss = [&] {
-    return torch::tensor(
-               adapt(samples_->prima, samples_->features, samples_->keypoints, all(steps(0)), options).loss)
-        .flatten();
+    const TtaResult result =
+        adapt(samples_->prima, samples_->features, samples_->keypoints, all(steps(0)), options);
+    std::vector<double> losses;
+    for (const auto& curve : result.loss) losses.push_back(curve.at(0));
+    return torch::tensor(losses, torch::kFloat64);
   };
   const torch::Tensor without = first_loss();
   options.pose_prior_weight = 2.0;
