@@ -1,27 +1,14 @@
 #include "loaders/formats/foreign_hdf5.h"
 
-#include <fmt/format.h>
+#include <utility>
 
-#include <algorithm>
-#include <stdexcept>
+#include "loaders/formats/hdf5_claims.h"
 
 namespace q3d::loaders::formats {
 namespace {
 
 using manifests::hdf5::check;
 using manifests::hdf5::Handle;
-
-constexpr std::uint64_t kMaxBytes = std::uint64_t{4} << 30U;
-constexpr std::uint64_t kMaxCompression = 1100;  // deflate reaches 1032
-constexpr int kMaxDimensions = 8;
-
-[[noreturn]] void refuse(const std::string& name, const std::string& got, const std::string& expected) {
-  throw std::runtime_error(fmt::format("{}: got {}, expected {}", name, got, expected));
-}
-
-std::string text_from(const char* start, std::size_t size) {
-  return {start, std::find(start, start + size, '\0')};
-}
 
 // Reads texts of variable length, which HDF5 allocates one by one.
 std::vector<std::string> variable_texts(hid_t dataset, hid_t space, std::uint64_t count,
@@ -64,31 +51,10 @@ bool ForeignHdf5::has_group(const std::string& name) const {
 // `element_bytes` is the size of an element in memory; 0 takes the size that the file states.
 ForeignHdf5::Opened ForeignHdf5::open(const std::string& name, std::uint64_t element_bytes) const {
   if (!has_dataset(name)) refuse(name, "nothing", "a dataset of this name");
-  Handle dataset(H5Dopen2(file_, name.c_str(), H5P_DEFAULT), H5Dclose, name);
-  Handle type(H5Dget_type(dataset.get()), H5Tclose, name);
-  const Handle space(H5Dget_space(dataset.get()), H5Sclose, name);
-  const Handle creation(H5Dget_create_plist(dataset.get()), H5Pclose, name);
-  if (H5Pget_external_count(creation.get()) != 0)
-    refuse(name, "a dataset whose bytes lie in another file", "one whose bytes lie in this file");
-  const int dimensions = check(H5Sget_simple_extent_ndims(space.get()), name);
-  if (dimensions > kMaxDimensions) refuse(name, fmt::format("{} dimensions", dimensions), "at most 8");
-  std::vector<hsize_t> extents(static_cast<std::size_t>(dimensions));
-  check(H5Sget_simple_extent_dims(space.get(), extents.data(), nullptr), name);
-  std::uint64_t count = 1;
-  std::uint64_t bytes = element_bytes > 0 ? element_bytes : H5Tget_size(type.get());
-  bool overflows = false;
-  for (const hsize_t extent : extents) {
-    overflows = overflows || __builtin_mul_overflow(count, extent, &count);
-  }
-  overflows = overflows || __builtin_mul_overflow(bytes, count, &bytes);
-  const std::uint64_t stored = std::min<std::uint64_t>(H5Dget_storage_size(dataset.get()), file_bytes_);
-  if (overflows || bytes > kMaxBytes || bytes > kMaxCompression * stored) {
-    refuse(name,
-           fmt::format("a claim of {} bytes in a file of {}", overflows ? "2^64" : std::to_string(bytes),
-                       file_bytes_),
-           "at most what such a file can hold");
-  }
-  return {std::move(dataset), std::move(type), std::move(extents), count};
+  ClaimedDataset dataset = open_dataset(file_, name, name);
+  const std::uint64_t bytes = element_bytes > 0 ? element_bytes : H5Tget_size(dataset.type.get());
+  const std::uint64_t count = checked_count(dataset, bytes, file_bytes_, name);
+  return {std::move(dataset.id), std::move(dataset.type), std::move(dataset.extents), count};
 }
 
 std::vector<std::uint64_t> ForeignHdf5::extents(const std::string& name) const {
@@ -161,41 +127,27 @@ std::optional<std::string> ForeignHdf5::text_attribute(const std::string& object
                                                        const std::string& attribute) const {
   const std::string where = object + "." + attribute;
   const Handle holder(H5Oopen(file_, object.c_str(), H5P_DEFAULT), H5Oclose, object);
-  if (check(H5Aexists(holder.get(), attribute.c_str()), where) == 0) return std::nullopt;
-  const Handle opened(H5Aopen(holder.get(), attribute.c_str(), H5P_DEFAULT), H5Aclose, where);
-  const Handle type(H5Aget_type(opened.get()), H5Tclose, where);
-  const Handle space(H5Aget_space(opened.get()), H5Sclose, where);
-  const std::size_t size = H5Tget_size(type.get());
-  if (H5Tget_class(type.get()) != H5T_STRING || H5Sget_simple_extent_npoints(space.get()) != 1 ||
-      size > file_bytes_) {
-    refuse(where, "another type", "one text");
-  }
-  if (H5Tis_variable_str(type.get()) > 0) {
-    char* pointer = nullptr;
-    check(H5Aread(opened.get(), type.get(), &pointer), where);
-    std::string text = pointer == nullptr ? "" : pointer;
-    check(H5Dvlen_reclaim(type.get(), space.get(), H5P_DEFAULT, &pointer), where);
-    return text;
-  }
-  std::string text(size, '\0');
-  check(H5Aread(opened.get(), type.get(), text.data()), where);
-  return text_from(text.data(), size);
+  const auto opened = open_attribute(holder.get(), attribute, file_bytes_, where);
+  if (!opened) return std::nullopt;
+  if (H5Tget_class(opened->type.get()) != H5T_STRING) refuse(where, "another type", "one text");
+  if (H5Tis_variable_str(opened->type.get()) <= 0) return fixed_text(*opened, where);
+  char* pointer = nullptr;
+  check(H5Aread(opened->id.get(), opened->type.get(), &pointer), where);
+  std::string text = pointer == nullptr ? "" : pointer;
+  check(H5Dvlen_reclaim(opened->type.get(), opened->space.get(), H5P_DEFAULT, &pointer), where);
+  return text;
 }
 
 std::optional<double> ForeignHdf5::number_attribute(const std::string& object,
                                                     const std::string& attribute) const {
   const std::string where = object + "." + attribute;
   const Handle holder(H5Oopen(file_, object.c_str(), H5P_DEFAULT), H5Oclose, object);
-  if (check(H5Aexists(holder.get(), attribute.c_str()), where) == 0) return std::nullopt;
-  const Handle opened(H5Aopen(holder.get(), attribute.c_str(), H5P_DEFAULT), H5Aclose, where);
-  const Handle type(H5Aget_type(opened.get()), H5Tclose, where);
-  const Handle space(H5Aget_space(opened.get()), H5Sclose, where);
-  const H5T_class_t kind = H5Tget_class(type.get());
-  if ((kind != H5T_INTEGER && kind != H5T_FLOAT) || H5Sget_simple_extent_npoints(space.get()) != 1) {
-    refuse(where, "another type", "one number");
-  }
+  const auto opened = open_attribute(holder.get(), attribute, file_bytes_, where);
+  if (!opened) return std::nullopt;
+  const H5T_class_t kind = H5Tget_class(opened->type.get());
+  if (kind != H5T_INTEGER && kind != H5T_FLOAT) refuse(where, "another type", "one number");
   double value = 0.0;
-  check(H5Aread(opened.get(), H5T_NATIVE_DOUBLE, &value), where);
+  check(H5Aread(opened->id.get(), H5T_NATIVE_DOUBLE, &value), where);
   return value;
 }
 

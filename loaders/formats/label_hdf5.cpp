@@ -21,6 +21,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "loaders/formats/hdf5_claims.h"
 #include "loaders/formats/label_table.h"
 #include "loaders/formats/own_process.h"
 #include "loaders/formats/pickled_names.h"
@@ -33,21 +34,8 @@ namespace {
 using manifests::hdf5::check;
 using manifests::hdf5::Handle;
 
-constexpr std::uint64_t kMaxBytes = std::uint64_t{4} << 30U;
-constexpr std::uint64_t kMaxCompression = 1100;  // deflate reaches 1032
 constexpr std::int64_t kMaxLevels = 8;
 constexpr std::chrono::seconds kMaxTime{600};
-
-[[noreturn]] void refuse(const std::string& name, const std::string& got, const std::string& expected) {
-  throw std::runtime_error(fmt::format("{}: got {}, expected {}", name, got, expected));
-}
-
-// An open dataset with its extents.
-struct StoredDataset {
-  Handle id;
-  Handle type;
-  std::vector<hsize_t> extents;
-};
 
 // Refuses links, because they could lead to another file.
 void require_own(hid_t parent, const std::string& name, const std::string& where) {
@@ -69,9 +57,10 @@ class PandasGroup {
 
   std::string text_attribute(const std::string& attribute) const;
   std::int64_t integer_attribute(const std::string& attribute) const;
-  StoredDataset open(const std::string& member, std::size_t rank) const;
+  ClaimedDataset open(const std::string& member, std::size_t rank) const;
   // Throws if the file cannot hold what the dataset claims.
-  void check_size(const StoredDataset& dataset, const std::string& member, std::uint64_t element_bytes) const;
+  void check_size(const ClaimedDataset& dataset, const std::string& member,
+                  std::uint64_t element_bytes) const;
 
   std::vector<std::string> names(const std::string& member) const;  // texts, or whole numbers as text
   std::vector<std::int64_t> integers(const std::string& member) const;
@@ -84,79 +73,46 @@ class PandasGroup {
   std::uint64_t file_bytes_;
 };
 
-std::string text_from(const char* start, std::size_t size) {
-  return {start, std::find(start, start + size, '\0')};
-}
-
 std::string PandasGroup::text_attribute(const std::string& attribute) const {
   const std::string where = name_ + "." + attribute;
-  if (check(H5Aexists(id(), attribute.c_str()), where) == 0) refuse(where, "nothing", "a text");
-  const Handle opened(H5Aopen(id(), attribute.c_str(), H5P_DEFAULT), H5Aclose, where);
-  const Handle type(H5Aget_type(opened.get()), H5Tclose, where);
-  const Handle space(H5Aget_space(opened.get()), H5Sclose, where);
-  const std::size_t size = H5Tget_size(type.get());
-  if (H5Tget_class(type.get()) != H5T_STRING || H5Tis_variable_str(type.get()) != 0 ||
-      H5Sget_simple_extent_npoints(space.get()) != 1 || size > file_bytes_) {
+  const auto opened = open_attribute(id(), attribute, file_bytes_, where);
+  if (!opened) refuse(where, "nothing", "a text");
+  if (H5Tget_class(opened->type.get()) != H5T_STRING || H5Tis_variable_str(opened->type.get()) != 0) {
     refuse(where, "another type", "one text of fixed length");
   }
-  std::string text(size, '\0');
-  check(H5Aread(opened.get(), type.get(), text.data()), where);
-  return text_from(text.data(), size);
+  return fixed_text(*opened, where);
 }
 
 std::int64_t PandasGroup::integer_attribute(const std::string& attribute) const {
   const std::string where = name_ + "." + attribute;
-  if (check(H5Aexists(id(), attribute.c_str()), where) == 0) refuse(where, "nothing", "a whole number");
-  const Handle opened(H5Aopen(id(), attribute.c_str(), H5P_DEFAULT), H5Aclose, where);
-  const Handle type(H5Aget_type(opened.get()), H5Tclose, where);
-  const Handle space(H5Aget_space(opened.get()), H5Sclose, where);
-  if (H5Tget_class(type.get()) != H5T_INTEGER || H5Sget_simple_extent_npoints(space.get()) != 1) {
-    refuse(where, "another type", "a whole number");
-  }
+  const auto opened = open_attribute(id(), attribute, file_bytes_, where);
+  if (!opened) refuse(where, "nothing", "a whole number");
+  if (H5Tget_class(opened->type.get()) != H5T_INTEGER) refuse(where, "another type", "a whole number");
   std::int64_t value = 0;
-  check(H5Aread(opened.get(), H5T_NATIVE_INT64, &value), where);
+  check(H5Aread(opened->id.get(), H5T_NATIVE_INT64, &value), where);
   return value;
 }
 
-StoredDataset PandasGroup::open(const std::string& member, std::size_t rank) const {
+ClaimedDataset PandasGroup::open(const std::string& member, std::size_t rank) const {
   const std::string where = path(member);
   H5O_info_t object{};
   require_own(id(), member, where);
   check(H5Oget_info_by_name(id(), member.c_str(), &object, H5P_DEFAULT), where);
   if (object.type != H5O_TYPE_DATASET) refuse(where, "an object of another kind", "a dataset");
-  Handle dataset(H5Dopen2(id(), member.c_str(), H5P_DEFAULT), H5Dclose, where);
-  Handle type(H5Dget_type(dataset.get()), H5Tclose, where);
-  const Handle space(H5Dget_space(dataset.get()), H5Sclose, where);
-  const Handle creation(H5Dget_create_plist(dataset.get()), H5Pclose, where);
-  if (H5Pget_external_count(creation.get()) != 0)
-    refuse(where, "a dataset whose bytes lie in another file", "one whose bytes lie in this file");
-  const int dimensions = check(H5Sget_simple_extent_ndims(space.get()), where);
-  if (static_cast<std::size_t>(dimensions) != rank) {
-    refuse(where, fmt::format("{} dimensions", dimensions), std::to_string(rank));
+  ClaimedDataset dataset = open_dataset(id(), member, where);
+  if (dataset.extents.size() != rank) {
+    refuse(where, fmt::format("{} dimensions", dataset.extents.size()), std::to_string(rank));
   }
-  std::vector<hsize_t> extents(rank);
-  check(H5Sget_simple_extent_dims(space.get(), extents.data(), nullptr), where);
-  return {std::move(dataset), std::move(type), std::move(extents)};
+  return dataset;
 }
 
-void PandasGroup::check_size(const StoredDataset& dataset, const std::string& member,
+void PandasGroup::check_size(const ClaimedDataset& dataset, const std::string& member,
                              std::uint64_t element_bytes) const {
-  std::uint64_t bytes = element_bytes;
-  bool overflows = false;
-  for (const hsize_t extent : dataset.extents) {
-    overflows = overflows || __builtin_mul_overflow(bytes, extent, &bytes);
-  }
-  const std::uint64_t stored = std::min<std::uint64_t>(H5Dget_storage_size(dataset.id.get()), file_bytes_);
-  if (overflows || bytes > kMaxBytes || bytes > kMaxCompression * stored) {
-    refuse(path(member),
-           fmt::format("a claim of {} bytes in a file of {}", overflows ? "2^64" : std::to_string(bytes),
-                       file_bytes_),
-           "at most what such a file can hold");
-  }
+  checked_count(dataset, element_bytes, file_bytes_, path(member));
 }
 
 std::vector<std::int64_t> PandasGroup::integers(const std::string& member) const {
-  const StoredDataset dataset = open(member, 1);
+  const ClaimedDataset dataset = open(member, 1);
   if (H5Tget_class(dataset.type.get()) != H5T_INTEGER) refuse(path(member), "another type", "whole numbers");
   check_size(dataset, member, sizeof(std::int64_t));
   std::vector<std::int64_t> values(dataset.extents[0]);
@@ -167,7 +123,7 @@ std::vector<std::int64_t> PandasGroup::integers(const std::string& member) const
 }
 
 std::vector<std::string> PandasGroup::names(const std::string& member) const {
-  const StoredDataset dataset = open(member, 1);
+  const ClaimedDataset dataset = open(member, 1);
   const H5T_class_t kind = H5Tget_class(dataset.type.get());
   std::vector<std::string> names;
   if (kind == H5T_INTEGER) {
@@ -227,11 +183,11 @@ void read_fixed(const PandasGroup& group, LabelTable& table) {
   if (group.text_attribute("axis1_variety") == "multi") {
     for (const auto& parts : group.multi_index("axis1")) table.rows.push_back(row_name(parts));
   } else {
-    const StoredDataset index = group.open("axis1", 1);
+    const ClaimedDataset index = group.open("axis1", 1);
     table.rows_are_numbers = H5Tget_class(index.type.get()) == H5T_INTEGER;
     for (const std::string& name : group.names("axis1")) table.rows.push_back(row_name({name}));
   }
-  const StoredDataset values = group.open("block0_values", 2);
+  const ClaimedDataset values = group.open("block0_values", 2);
   if (H5Tget_class(values.type.get()) != H5T_FLOAT)
     refuse(group.path("block0_values"), "another type", "floats");
   if (values.extents[0] != table.rows.size() || values.extents[1] != table.columns.size()) {
@@ -252,7 +208,7 @@ struct TableRow {
   bool index_is_number;
 };
 
-TableRow table_row(const PandasGroup& group, const StoredDataset& table, std::size_t columns) {
+TableRow table_row(const PandasGroup& group, const ClaimedDataset& table, std::size_t columns) {
   const std::string where = group.path("table");
   if (H5Tget_class(table.type.get()) != H5T_COMPOUND || H5Tget_nmembers(table.type.get()) != 2 ||
       H5Tget_member_index(table.type.get(), "index") != 0 ||
@@ -287,7 +243,7 @@ void read_rows(const PandasGroup& group, LabelTable& table) {
               group, table);
   const std::size_t columns = table.columns.size();
   if (columns == 0) refuse(group.path("non_index_axes"), "no columns", "at least one");
-  const StoredDataset stored = group.open("table", 1);
+  const ClaimedDataset stored = group.open("table", 1);
   const TableRow row = table_row(group, stored, columns);
   const std::size_t row_bytes = row.index_bytes + columns * sizeof(double);
   group.check_size(stored, "table", row_bytes);
