@@ -19,8 +19,8 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <set>
-#include <stdexcept>
 
+#include "loaders/formats/hdf5_claims.h"
 #include "loaders/formats/sleap.h"
 
 namespace q3d::loaders::formats {
@@ -30,10 +30,6 @@ using nlohmann::json;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kCentredFormat = 1.1;
-
-[[noreturn]] void refuse(const std::string& where, const std::string& got, const std::string& expected) {
-  throw std::runtime_error(fmt::format("{}: got {}, expected {}", where, got, expected));
-}
 
 json parsed(const std::string& text, const std::string& where) {
   json value = json::parse(text, nullptr, /*allow_exceptions=*/false);
