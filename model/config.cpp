@@ -6,12 +6,13 @@
 #include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <numeric>
 #include <stdexcept>
 #include <string_view>
 #include <tuple>
 #include <variant>
 #include <vector>
+
+#include "manifests/spelling.h"
 
 namespace q3d::model {
 namespace {
@@ -52,30 +53,14 @@ constexpr std::array kFields{
     Field{"dropout", &PrimaConfig::dropout},
 };
 
-std::size_t edit_distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t replaced = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
-      diagonal = row[j];
-      row[j] = std::min({row[j] + 1, row[j - 1] + 1, replaced});
-    }
-  }
-  return row[b.size()];
-}
-
 const Field& find_field(const std::string& key) {
-  const auto nearest = std::min_element(kFields.begin(), kFields.end(), [&](const Field& a, const Field& b) {
-    return edit_distance(key, a.key) < edit_distance(key, b.key);
-  });
-  if (nearest->key != key) {
-    throw std::invalid_argument(
-        fmt::format("model config: unknown key '{}'; did you mean '{}'?", key, nearest->key));
-  }
-  return *nearest;
+  const auto found =
+      std::find_if(kFields.begin(), kFields.end(), [&](const Field& f) { return f.key == key; });
+  if (found != kFields.end()) return *found;
+  std::vector<std::string> keys;
+  for (const Field& field : kFields) keys.emplace_back(field.key);
+  throw std::invalid_argument(fmt::format("model config: unknown key '{}'; did you mean '{}'?", key,
+                                          manifests::nearest_word(key, keys)));
 }
 
 void require_type(const std::string& key, const nlohmann::json& value, bool fits, std::string_view expected) {

@@ -8,6 +8,7 @@
 
 #include "loaders/keypoints/builtin_topologies.h"
 #include "loaders/keypoints/topology_file.h"
+#include "manifests/spelling.h"
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/options.h"
 #include "pipeline/run/command_line.h"
@@ -53,7 +54,7 @@ int show_builtin(const std::string& name) {
     names.emplace_back(each.name);
   }
   throw run::ConfigError(fmt::format("topology --show: \"{}\" is no built-in topology{}; they are {}", name,
-                                     run::suggestion(name, names), fmt::join(names, ", ")));
+                                     manifests::suggestion(name, names), fmt::join(names, ", ")));
 }
 
 // Tells what was guessed, with all doubts at once.

@@ -5,8 +5,8 @@
 
 #include <algorithm>
 
+#include "manifests/spelling.h"
 #include "pipeline/cli/commands.h"
-#include "pipeline/run/words.h"
 
 namespace q3d::pipeline::cli {
 namespace {
@@ -60,12 +60,12 @@ std::string unknown_words(const CLI::App& app) {
     if (!is_option(word)) continue;
     const std::string name = option_name(word);
     text += fmt::format("{}unknown option \"{}\"{}", text.empty() ? "" : " ", name,
-                        run::suggestion(name, option_names(app)));
+                        manifests::suggestion(name, option_names(app)));
   }
   if (text.empty() && !words.empty()) {
     const bool is_command = !commands.empty();
     text = fmt::format("{} \"{}\"{}", is_command ? "unknown command" : "unexpected word", words.front(),
-                       is_command ? run::suggestion(words.front(), commands) : "");
+                       is_command ? manifests::suggestion(words.front(), commands) : "");
   }
   return text;
 }
@@ -87,7 +87,7 @@ std::optional<std::string> unknown_command(const std::vector<std::string>& words
   return fmt::format(
       "quadruped3d: unknown command \"{}\"{}\nThe commands are {}.\n`quadruped3d help COMMAND` explains "
       "one.\n",
-      words[1], run::suggestion(words[1], names), fmt::join(names, ", "));
+      words[1], manifests::suggestion(words[1], names), fmt::join(names, ", "));
 }
 
 std::string usage_message(const CLI::App& app, const CLI::ParseError& error) {

@@ -6,10 +6,10 @@
 
 #include "manifests/atomic_file.h"
 #include "manifests/file_descriptor.h"
+#include "manifests/spelling.h"
 #include "pipeline/config/config_override.h"
 #include "pipeline/config/json_depth.h"
 #include "pipeline/run/errors.h"
-#include "pipeline/run/words.h"
 
 namespace q3d::pipeline::config {
 namespace {
@@ -64,7 +64,7 @@ void require_one_of(const std::string& value, const std::vector<std::string>& kn
   std::string list;
   for (const auto& word : known) list += (list.empty() ? "" : ", ") + word;
   throw run::ConfigError(fmt::format("{}: \"{}\" is not known; expected one of: {}. Did you mean \"{}\"?",
-                                     where, value, list, run::nearest_word(value, known)));
+                                     where, value, list, manifests::nearest_word(value, known)));
 }
 
 }  // namespace q3d::pipeline::config

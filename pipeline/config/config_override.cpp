@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "manifests/spelling.h"
 #include "pipeline/config/json_depth.h"
 #include "pipeline/run/errors.h"
 #include "pipeline/run/words.h"
@@ -62,7 +63,7 @@ std::size_t place_in(const json& list, const std::string& key, const ConfigOverr
   fail(given, fmt::format("the list has {}, and \"{}\" is neither the place of one, counted from 0, nor its "
                           "\"name\"{}",
                           run::counted(static_cast<std::int64_t>(list.size()), "entry", "entries"), key,
-                          run::suggestion(key, names)));
+                          manifests::suggestion(key, names)));
 }
 
 // Returns the keys with places for members of lists, as a JSON pointer into the config.

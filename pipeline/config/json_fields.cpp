@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "pipeline/run/words.h"
+#include "manifests/spelling.h"
 
 namespace q3d::pipeline::config {
 
@@ -27,7 +27,7 @@ void JsonFields::finish() const {
   for (const auto& [key, value] : object_.items()) {
     if (known_.count(key) != 0) continue;
     problems += fmt::format("{}unknown key \"{}\"; did you mean \"{}\"?", problems.empty() ? "" : " ", key,
-                            run::nearest_word(key, {known_.begin(), known_.end()}));
+                            manifests::nearest_word(key, {known_.begin(), known_.end()}));
   }
   if (!problems.empty()) throw run::ConfigError(where_ + ": " + problems);
 }
@@ -35,7 +35,7 @@ void JsonFields::finish() const {
 void JsonFields::fail_missing(const std::string& key) const {
   std::string hint;
   for (const auto& [other, value] : object_.items()) {
-    if (other != key && known_.count(other) == 0 && run::is_misspelling(key, other)) {
+    if (other != key && known_.count(other) == 0 && manifests::is_misspelling(key, other)) {
       hint = fmt::format("; \"{}\" is not known: did you mean \"{}\"?", other, key);
     }
   }

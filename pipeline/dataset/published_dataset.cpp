@@ -9,7 +9,7 @@
 #include "manifests/digest.h"
 #include "manifests/enumerators.h"
 #include "manifests/journal.h"
-#include "pipeline/run/words.h"
+#include "manifests/spelling.h"
 #include "pipeline/stages/stage_store.h"
 #include "pipeline/unit/unit_tables.h"
 
@@ -49,7 +49,7 @@ class NearIds {
           fmt::format("{}: \"{}\" is a part of the ids of {} candidates; give more of one of them:\n  {}{}",
                       file.string(), given_, matches_, fmt::join(matching_ids_, "\n  "), more));
     }
-    const std::string nearest = run::nearest_word(given_, near_ids_);
+    const std::string nearest = manifests::nearest_word(given_, near_ids_);
     throw std::runtime_error(fmt::format("{}: no candidate has \"{}\" as its id or as a part of its id{}",
                                          file.string(), given_,
                                          nearest.empty() ? "" : fmt::format("; the nearest is {}", nearest)));
