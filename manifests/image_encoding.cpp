@@ -5,21 +5,21 @@
 namespace q3d::manifests {
 namespace {
 
-constexpr std::array<std::string_view, 3> kNames{"jpeg", "png", "reference"};
-static_assert(kNames.size() == static_cast<std::size_t>(ImageEncoding::reference) + 1);
+constexpr EnumNames kNames("image encoding", ImageEncoding::jpeg, ImageEncoding::reference,
+                           {"jpeg", "png", "reference"});
 
 }  // namespace
 
 std::string_view to_string(ImageEncoding encoding) {
-  return kNames.at(static_cast<std::size_t>(encoding));
+  return kNames.name(encoding);
 }
 
 ImageEncoding image_encoding_from_string(std::string_view name) {
-  return enum_from_name<ImageEncoding>("image encoding", name, kNames);
+  return kNames.value(name);
 }
 
 std::span<const std::string_view> image_encoding_names() {
-  return kNames;
+  return kNames.all();
 }
 
 }  // namespace q3d::manifests

@@ -1,27 +1,25 @@
 #include "model/settings/loss_weights.h"
 
-#include <array>
-
 #include "manifests/enum_names.h"
 
 namespace q3d::model::settings {
 namespace {
 
-constexpr std::array<std::string_view, 2> kVariantNames{"sound", "official"};
-static_assert(kVariantNames.size() == static_cast<std::size_t>(LossVariant::official) + 1);
+constexpr manifests::EnumNames kVariants("loss variant", LossVariant::sound, LossVariant::official,
+                                         {"sound", "official"});
 
 }  // namespace
 
 std::string_view to_string(LossVariant variant) {
-  return kVariantNames.at(static_cast<std::size_t>(variant));
+  return kVariants.name(variant);
 }
 
 std::vector<std::string> loss_variant_names() {
-  return {kVariantNames.begin(), kVariantNames.end()};
+  return {kVariants.all().begin(), kVariants.all().end()};
 }
 
 LossVariant loss_variant_from_string(std::string_view name) {
-  return manifests::enum_from_name<LossVariant>("loss variant", name, kVariantNames);
+  return kVariants.value(name);
 }
 
 }  // namespace q3d::model::settings

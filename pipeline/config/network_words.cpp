@@ -1,42 +1,38 @@
 #include "pipeline/config/network_words.h"
 
-#include <array>
-
 #include "manifests/enum_names.h"
 
 namespace q3d::pipeline::config {
 namespace {
 
-constexpr std::array<std::string_view, 2> kDtypeNames{"float32", "bfloat16"};
-static_assert(kDtypeNames.size() == static_cast<std::size_t>(Dtype::bfloat16) + 1);
-
-constexpr std::array<std::string_view, 2> kObjectiveNames{"paper", "demo"};
-static_assert(kObjectiveNames.size() == static_cast<std::size_t>(TtaObjective::demo) + 1);
+constexpr manifests::EnumNames kDtypes("dtype", Dtype::float32, Dtype::bfloat16, {"float32", "bfloat16"});
+constexpr manifests::EnumNames kObjectives("objective", TtaObjective::paper, TtaObjective::demo,
+                                           {"paper", "demo"});
 
 }  // namespace
 
 std::string_view to_string(Dtype dtype) {
-  return kDtypeNames.at(static_cast<std::size_t>(dtype));
+  return kDtypes.name(dtype);
 }
 
 Dtype dtype_from_string(std::string_view name) {
-  return manifests::enum_from_name<Dtype>("dtype", name, kDtypeNames);
+  return kDtypes.value(name);
 }
 
 std::span<const std::string_view> dtype_names() {
-  return kDtypeNames;
+  return kDtypes.all();
 }
 
 std::string_view to_string(TtaObjective objective) {
-  return kObjectiveNames.at(static_cast<std::size_t>(objective));
+  return kObjectives.name(objective);
 }
 
 TtaObjective tta_objective_from_string(std::string_view name) {
-  return manifests::enum_from_name<TtaObjective>("objective", name, kObjectiveNames);
+  return kObjectives.value(name);
 }
 
 std::span<const std::string_view> tta_objective_names() {
-  return kObjectiveNames;
+  return kObjectives.all();
 }
 
 }  // namespace q3d::pipeline::config

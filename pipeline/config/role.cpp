@@ -1,27 +1,24 @@
 #include "pipeline/config/role.h"
 
-#include <array>
-
 #include "manifests/enum_names.h"
 
 namespace q3d::pipeline::config {
 namespace {
 
-constexpr std::array<std::string_view, 3> kRoleNames{"pseudo", "truth", "2d_only"};
-static_assert(kRoleNames.size() == static_cast<std::size_t>(Role::two_d_only) + 1);
+constexpr manifests::EnumNames kRoles("role", Role::pseudo, Role::two_d_only, {"pseudo", "truth", "2d_only"});
 
 }  // namespace
 
 std::string_view to_string(Role role) {
-  return kRoleNames.at(static_cast<std::size_t>(role));
+  return kRoles.name(role);
 }
 
 std::vector<std::string> role_names() {
-  return {kRoleNames.begin(), kRoleNames.end()};
+  return {kRoles.all().begin(), kRoles.all().end()};
 }
 
 Role role_from_string(std::string_view name) {
-  return manifests::enum_from_name<Role>("role", name, kRoleNames);
+  return kRoles.value(name);
 }
 
 manifests::LabelKind label_kind(Role role, manifests::Verdict verdict) {

@@ -1,28 +1,27 @@
 #include "pipeline/dataset/warnings.h"
 
-#include <array>
-
 #include "manifests/enum_names.h"
 
 namespace q3d::pipeline::dataset {
 namespace {
 
-constexpr std::array<std::string_view, 4> kNames{"above_ceiling", "outside_domain", "rendered_network",
-                                                 "rendered_body"};
-static_assert(kNames.size() == static_cast<std::size_t>(WarningKind::rendered_body) + 1);
+constexpr manifests::EnumNames kKinds("kind of warning", WarningKind::above_ceiling,
+                                      WarningKind::rendered_body,
+                                      {"above_ceiling", "outside_domain", "rendered_network",
+                                       "rendered_body"});
 
 }  // namespace
 
 std::string_view to_string(WarningKind kind) {
-  return kNames.at(static_cast<std::size_t>(kind));
+  return kKinds.name(kind);
 }
 
 WarningKind warning_kind_from_string(std::string_view name) {
-  return manifests::enum_from_name<WarningKind>("kind of warning", name, kNames);
+  return kKinds.value(name);
 }
 
 std::span<const std::string_view> warning_kind_names() {
-  return kNames;
+  return kKinds.all();
 }
 
 nlohmann::ordered_json to_json(const std::vector<Warning>& warnings) {

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
@@ -16,7 +15,8 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::array<std::string_view, 3> kPicturesNames{"unknown", "photographs", "rendered"};
+constexpr manifests::EnumNames kPictures("kind of pictures", Pictures::unknown, Pictures::rendered,
+                                         {"unknown", "photographs", "rendered"});
 
 std::vector<ErrorQuantile> quantiles_from(const json& l_proj) {
   std::vector<ErrorQuantile> quantiles;
@@ -41,8 +41,7 @@ std::vector<ErrorQuantile> quantiles_from(const json& l_proj) {
 }  // namespace
 
 std::string to_json(const NetworkDomain& domain) {
-  json document = {{"pictures", kPicturesNames.at(static_cast<std::size_t>(domain.pictures))},
-                   {"trained_on", domain.trained_on}};
+  json document = {{"pictures", kPictures.name(domain.pictures)}, {"trained_on", domain.trained_on}};
   if (!domain.quantiles.empty()) {
     json l_proj = json::object();
     for (const ErrorQuantile& each : domain.quantiles) l_proj[fmt::format("{}", each.share)] = each.l_proj;
@@ -56,8 +55,7 @@ NetworkDomain domain_from_json(const std::string& text) {
   try {
     const json document = json::parse(text);
     NetworkDomain domain;
-    domain.pictures = manifests::enum_from_name<Pictures>(
-        "kind of pictures", document.at("pictures").get<std::string>(), kPicturesNames);
+    domain.pictures = kPictures.value(document.at("pictures").get<std::string>());
     domain.trained_on = document.at("trained_on").get<std::string>();
     if (!document.contains("held_out")) return domain;
     const json& held_out = document.at("held_out");
