@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "manifests/uniform.h"
+#include "manifests/random.h"
 
 namespace q3d::filters {
 namespace {

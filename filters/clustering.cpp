@@ -9,7 +9,7 @@
 #include <string>
 #include <utility>
 
-#include "manifests/uniform.h"
+#include "manifests/random.h"
 
 namespace q3d::filters {
 namespace {

@@ -2,14 +2,13 @@
 // logarithms that differ between CPUs.
 #include "model/seeded_uniform.h"
 
+#include "manifests/random.h"
+
 namespace q3d::model {
 namespace {
 
-std::uint64_t mix(std::uint64_t x) {  // the finaliser of SplitMix64 (Steele, Lea, Flood 2014)
-  x += 0x9e3779b97f4a7c15ULL;
-  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ULL;
-  x = (x ^ (x >> 27)) * 0x94d049bb133111ebULL;
-  return x ^ (x >> 31);
+std::uint64_t mix(std::uint64_t x) {
+  return manifests::scramble(x + manifests::kSplitMixStep);
 }
 
 std::uint64_t stream_of(std::uint64_t seed, std::string_view name) {
@@ -24,7 +23,7 @@ void fill_uniform(torch::Tensor& tensor, double bound, std::uint64_t seed, std::
   const std::uint64_t stream = stream_of(seed, name);
   float* values = tensor.data_ptr<float>();
   for (std::int64_t i = 0; i < tensor.numel(); ++i) {
-    const double unit = static_cast<double>(mix(stream + static_cast<std::uint64_t>(i)) >> 11) * 0x1p-53;
+    const double unit = manifests::unit_interval(mix(stream + static_cast<std::uint64_t>(i)));
     values[i] = static_cast<float>((2.0 * unit - 1.0) * bound);
   }
 }

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <opencv2/core.hpp>
 
-#include "manifests/uniform.h"
+#include "manifests/random.h"
 
 namespace q3d::loaders::pictures {
 namespace {

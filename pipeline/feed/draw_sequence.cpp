@@ -4,7 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "pipeline/run/random.h"
+#include "manifests/random.h"
 
 namespace q3d::pipeline::feed {
 
@@ -26,7 +26,7 @@ DrawSequence::DrawSequence(const std::vector<PoolShare>& pools, std::uint64_t se
 }
 
 Draw DrawSequence::at(std::int64_t position) const {
-  run::Rng random(seed_, {static_cast<std::uint64_t>(position)});
+  manifests::Rng random(seed_, {static_cast<std::uint64_t>(position)});
   const double point = random.uniform();
   // The first pool whose part ends above the point; pools without weight have no part.
   const auto end = std::upper_bound(cumulative_.begin(), cumulative_.end(), point);

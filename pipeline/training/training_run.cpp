@@ -14,6 +14,7 @@
 #include "manifests/atomic_file.h"
 #include "manifests/digest.h"
 #include "manifests/lock.h"
+#include "manifests/random.h"
 #include "model/checkpoint.h"
 #include "model/device.h"
 #include "model/encoder_trainer.h"
@@ -28,7 +29,6 @@
 #include "pipeline/run/interrupt.h"
 #include "pipeline/run/log.h"
 #include "pipeline/run/progress.h"
-#include "pipeline/run/random.h"
 #include "pipeline/training/rank_agreement.h"
 #include "pipeline/training/training_log.h"
 #include "pipeline/training/training_state.h"
@@ -222,13 +222,14 @@ model::EncoderTrainerOptions encoder_options(const TrainingConfig& config, const
 
 // Of the draws of a phase.
 std::uint64_t phase_seed(const TrainingConfig& config, int phase_index) {
-  return run::Rng(config.seed, {static_cast<std::uint64_t>(phase_index)}).next();
+  return manifests::Rng(config.seed, {static_cast<std::uint64_t>(phase_index)}).next();
 }
 
 // Of dropout and stochastic depth in one step: ranks differ, and a resumed run needs no stored generator.
 std::uint64_t step_seed(const TrainingConfig& config, const TrainingPosition& position, int rank) {
-  return run::Rng(config.seed, {static_cast<std::uint64_t>(position.phase),
-                                static_cast<std::uint64_t>(position.step), static_cast<std::uint64_t>(rank)})
+  return manifests::Rng(config.seed,
+                        {static_cast<std::uint64_t>(position.phase),
+                         static_cast<std::uint64_t>(position.step), static_cast<std::uint64_t>(rank)})
       .next();
 }
 

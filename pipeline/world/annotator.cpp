@@ -42,7 +42,7 @@ void swap_sides(std::vector<Label>& labels, const std::vector<Landmark>& landmar
 }  // namespace
 
 std::vector<Label> annotate(const std::vector<Landmark>& landmarks, std::span<const SeenLandmark> seen,
-                            double box_side_px, const LabelHabits& habits, run::Rng& rng) {
+                            double box_side_px, const LabelHabits& habits, manifests::Rng& rng) {
   std::vector<Label> labels(landmarks.size());
   for (std::size_t i = 0; i < labels.size(); ++i) {
     const double rate = seen[i].occluded      ? habits.occluded

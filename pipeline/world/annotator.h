@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "pipeline/run/random.h"
+#include "manifests/random.h"
 #include "pipeline/world/landmarks.h"
 
 namespace q3d::pipeline::world {
@@ -37,6 +37,6 @@ struct Label {
 
 // One label a landmark. Swaps exchange the two sides of the fore legs, the hind legs, the face, or all.
 std::vector<Label> annotate(const std::vector<Landmark>& landmarks, std::span<const SeenLandmark> seen,
-                            double box_side_px, const LabelHabits& habits, run::Rng& rng);
+                            double box_side_px, const LabelHabits& habits, manifests::Rng& rng);
 
 }  // namespace q3d::pipeline::world

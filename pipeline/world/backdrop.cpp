@@ -25,7 +25,7 @@ struct Painter {
   const PictureCamera& camera;
   const Ground& ground;
   const NoiseField& noise;
-  run::Rng& rng;
+  manifests::Rng& rng;
   float subject_distance;  // where the lens is focused
   cv::Mat picture;         // BGR, 8 bit
   cv::Mat1f distance;      // along the ray to the ground; -1 where there is none
@@ -146,7 +146,7 @@ cv::Scalar to_bgr(const Colour& colour) {
 }
 
 void paint_blade(cv::Mat& picture, cv::Point2d foot_px, double length_px, const Colour& colour,
-                 run::Rng& rng) {
+                 manifests::Rng& rng) {
   constexpr int kShift = 4;  // sixteenths of a pixel
   const double lean = rng.normal(0.0, 0.35);
   const cv::Point2d tip = foot_px + cv::Point2d(lean, -1.0) * length_px;
@@ -157,7 +157,8 @@ void paint_blade(cv::Mat& picture, cv::Point2d foot_px, double length_px, const 
 }
 
 cv::Mat paint_backdrop(const Backdrop& backdrop, cv::Size size_px, const PictureCamera& camera,
-                       const Ground& ground, float subject_distance, const NoiseField& noise, run::Rng& rng) {
+                       const Ground& ground, float subject_distance, const NoiseField& noise,
+                       manifests::Rng& rng) {
   Painter painter{backdrop,
                   camera,
                   ground,

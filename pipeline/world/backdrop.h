@@ -5,7 +5,7 @@
 #include <opencv2/core.hpp>
 #include <string_view>
 
-#include "pipeline/run/random.h"
+#include "manifests/random.h"
 #include "pipeline/world/noise.h"
 #include "pipeline/world/scene.h"
 
@@ -31,21 +31,22 @@ struct Backdrop {
 };
 
 // Draws palette and furniture for a place.
-Backdrop draw_palette(Place place, run::Rng& rng);
+Backdrop draw_palette(Place place, manifests::Rng& rng);
 
 // Paints the surroundings (BGR, 8 bit) as the camera sees them; brightness is that of full light, without the
 // animal's shadow. The lens is focused at subject_distance (SMAL units).
 cv::Mat paint_backdrop(const Backdrop& backdrop, cv::Size size_px, const PictureCamera& camera,
-                       const Ground& ground, float subject_distance, const NoiseField& noise, run::Rng& rng);
+                       const Ground& ground, float subject_distance, const NoiseField& noise,
+                       manifests::Rng& rng);
 
 // Something that stands behind the animal: a trunk, a bush, a stone, a fence or a cupboard, as the place has
 // them.
 void paint_thing(cv::Mat& picture, const Backdrop& backdrop, const PictureCamera& camera,
-                 const Ground& ground, float subject_distance, run::Rng& rng);
+                 const Ground& ground, float subject_distance, manifests::Rng& rng);
 
 // A stroke of grass or a twig, from its foot upwards.
 void paint_blade(cv::Mat& picture, cv::Point2d foot_px, double length_px, const Colour& colour,
-                 run::Rng& rng);
+                 manifests::Rng& rng);
 
 cv::Scalar to_bgr(const Colour& colour);  // 0 to 255
 

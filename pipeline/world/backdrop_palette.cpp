@@ -164,7 +164,7 @@ const PlaceRow& row_of(Place place) {
   return place_table()[static_cast<std::size_t>(place)];
 }
 
-Colour varied(const Colour& colour, double spread, run::Rng& rng) {
+Colour varied(const Colour& colour, double spread, manifests::Rng& rng) {
   const auto gain = static_cast<float>(1.0 + rng.normal(0.0, spread));
   Colour result = colour * gain;
   for (int channel = 0; channel < 3; ++channel) {
@@ -173,12 +173,12 @@ Colour varied(const Colour& colour, double spread, run::Rng& rng) {
   return result.max(0.0F).min(1.0F);
 }
 
-float drawn(const Range& range, run::Rng& rng) {
+float drawn(const Range& range, manifests::Rng& rng) {
   return static_cast<float>(rng.uniform(range.low, range.high));
 }
 
 // What is above the horizon: weather outside, leaves in a forest, a wall in a room, a screen in a studio.
-void draw_sky(Backdrop& b, run::Rng& rng) {
+void draw_sky(Backdrop& b, manifests::Rng& rng) {
   const double weather = rng.uniform();
   if (b.place == Place::forest) {
     b.sky_high = rgb(150, 168, 150);
@@ -214,7 +214,7 @@ std::string_view to_string(Place place) {
   return row_of(place).name;
 }
 
-Backdrop draw_palette(Place place, run::Rng& rng) {
+Backdrop draw_palette(Place place, manifests::Rng& rng) {
   const PlaceRow& row = row_of(place);
   Backdrop b;
   b.place = place;

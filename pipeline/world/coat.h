@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "pipeline/run/random.h"
+#include "manifests/random.h"
 #include "pipeline/world/bodies.h"
 #include "pipeline/world/noise.h"
 #include "pipeline/world/scene.h"

@@ -42,20 +42,20 @@ struct Layer {
   }
 };
 
-Colour shade_of(const Backdrop& b, run::Rng& rng) {
+Colour shade_of(const Backdrop& b, manifests::Rng& rng) {
   return blend(b.blade_dark, b.blade_light, static_cast<float>(rng.uniform())) *
          static_cast<float>(rng.uniform(0.6, 1.0));
 }
 
-Colour bark(run::Rng& rng) {
+Colour bark(manifests::Rng& rng) {
   return blend(rgb(44, 36, 28), rgb(132, 114, 92), static_cast<float>(rng.uniform()));
 }
 
-cv::Point within(const cv::Rect& area, run::Rng& rng) {
+cv::Point within(const cv::Rect& area, manifests::Rng& rng) {
   return {area.x + rng.below(std::max(1, area.width)), area.y + rng.below(std::max(1, area.height))};
 }
 
-void leafy_branch(Layer& layer, const cv::Rect& animal, const Backdrop& backdrop, run::Rng& rng) {
+void leafy_branch(Layer& layer, const cv::Rect& animal, const Backdrop& backdrop, manifests::Rng& rng) {
   const cv::Point middle = within(animal, rng);
   const double angle = rng.uniform(-0.9, 0.9), reach = animal.width * rng.uniform(0.5, 1.0);
   const cv::Point2d along(std::cos(angle), std::sin(angle));
@@ -72,7 +72,7 @@ void leafy_branch(Layer& layer, const cv::Rect& animal, const Backdrop& backdrop
   }
 }
 
-void upright(Layer& layer, const cv::Rect& animal, run::Rng& rng) {
+void upright(Layer& layer, const cv::Rect& animal, manifests::Rng& rng) {
   const double x = animal.x + animal.width * rng.uniform(0.05, 0.95);
   const double width = animal.width * rng.uniform(0.04, 0.16), lean = animal.height * rng.normal(0.0, 0.1);
   const Colour colour = bark(rng);
@@ -89,7 +89,7 @@ void upright(Layer& layer, const cv::Rect& animal, run::Rng& rng) {
 }
 
 // A tuft: dense and high in its middle, thin at its edges.
-void tall_grass(Layer& layer, const cv::Rect& animal, const Backdrop& backdrop, run::Rng& rng) {
+void tall_grass(Layer& layer, const cv::Rect& animal, const Backdrop& backdrop, manifests::Rng& rng) {
   const int blades = 60 + rng.below(120);
   const double height = animal.height * rng.uniform(0.2, 0.5);
   const double middle = animal.x + animal.width * rng.uniform(0.0, 1.0),
@@ -107,7 +107,7 @@ void tall_grass(Layer& layer, const cv::Rect& animal, const Backdrop& backdrop, 
 }
 
 // Half a boulder before the animal: an uneven outline, its top lit.
-void stone(Layer& layer, const cv::Rect& animal, run::Rng& rng) {
+void stone(Layer& layer, const cv::Rect& animal, manifests::Rng& rng) {
   const Colour colour = blend(rgb(84, 80, 74), rgb(168, 162, 152), static_cast<float>(rng.uniform()));
   const double width = animal.width * rng.uniform(0.12, 0.3),
                height = animal.height * rng.uniform(0.15, 0.35);
@@ -128,7 +128,7 @@ void stone(Layer& layer, const cv::Rect& animal, run::Rng& rng) {
   }
 }
 
-void bars(Layer& layer, const cv::Rect& animal, run::Rng& rng) {
+void bars(Layer& layer, const cv::Rect& animal, manifests::Rng& rng) {
   const Colour colour = blend(rgb(60, 60, 62), rgb(180, 180, 178), static_cast<float>(rng.uniform()));
   const int thick = std::max(1, animal.width / 60);
   const double gap = animal.width * rng.uniform(0.12, 0.3);
@@ -142,7 +142,7 @@ void bars(Layer& layer, const cv::Rect& animal, run::Rng& rng) {
   }
 }
 
-void near_blur(Layer& layer, const cv::Rect& animal, const Backdrop& backdrop, run::Rng& rng) {
+void near_blur(Layer& layer, const cv::Rect& animal, const Backdrop& backdrop, manifests::Rng& rng) {
   const int blobs = 2 + rng.below(4);
   for (int i = 0; i < blobs; ++i) {
     const int reach = static_cast<int>(animal.width * rng.uniform(0.06, 0.18)) + 2;
@@ -155,7 +155,7 @@ void near_blur(Layer& layer, const cv::Rect& animal, const Backdrop& backdrop, r
 }  // namespace
 
 void paint_occluder(cv::Mat& picture, cv::Mat1b& cover, const cv::Rect& animal_px, const Backdrop& backdrop,
-                    run::Rng& rng) {
+                    manifests::Rng& rng) {
   Layer layer(picture.size());
   const bool indoors = backdrop.place == Place::room || backdrop.place == Place::studio;
   switch (indoors ? 1 + 3 * rng.below(2) : rng.below(6)) {
@@ -194,7 +194,8 @@ void paint_occluder(cv::Mat& picture, cv::Mat1b& cover, const cv::Rect& animal_p
 }
 
 void paint_grass_at_feet(cv::Mat& picture, const Backdrop& backdrop, const PictureCamera& camera,
-                         const Ground& ground, std::span<const Eigen::Vector3f> vertices, run::Rng& rng) {
+                         const Ground& ground, std::span<const Eigen::Vector3f> vertices,
+                         manifests::Rng& rng) {
   std::vector<Eigen::Vector3f> low;
   for (const Eigen::Vector3f& vertex : vertices) {
     if (ground.up.dot(vertex) - ground.level < 0.06F) low.push_back(vertex);

@@ -4,7 +4,7 @@
 #include <opencv2/core.hpp>
 #include <span>
 
-#include "pipeline/run/random.h"
+#include "manifests/random.h"
 #include "pipeline/world/backdrop.h"
 #include "pipeline/world/scene.h"
 
@@ -13,11 +13,12 @@ namespace q3d::pipeline::world {
 // Paints one occluder (a branch, a trunk or post, tall grass, a stone, bars, or something close and blurred)
 // over a part of the box that the animal fills, and adds to `cover` (255 = hidden by an occluder).
 void paint_occluder(cv::Mat& picture, cv::Mat1b& cover, const cv::Rect& animal_px, const Backdrop& backdrop,
-                    run::Rng& rng);
+                    manifests::Rng& rng);
 
 // Grass in front of the feet: blades that start at the vertices nearest the ground. Too thin to hide
 // anything.
 void paint_grass_at_feet(cv::Mat& picture, const Backdrop& backdrop, const PictureCamera& camera,
-                         const Ground& ground, std::span<const Eigen::Vector3f> vertices, run::Rng& rng);
+                         const Ground& ground, std::span<const Eigen::Vector3f> vertices,
+                         manifests::Rng& rng);
 
 }  // namespace q3d::pipeline::world

@@ -63,7 +63,8 @@ struct Placement {
   cv::Point2d centre_px;
 };
 
-Placement draw_placement(double aspect, cv::Size picture_px, const FramingHabits& habits, run::Rng& rng) {
+Placement draw_placement(double aspect, cv::Size picture_px, const FramingHabits& habits,
+                         manifests::Rng& rng) {
   // aspect = width / height of the animal as the camera sees it
   const double shorter = std::min(picture_px.width, picture_px.height);
   double side = shorter * rng.uniform(habits.fill_low, habits.fill_high);
@@ -127,7 +128,7 @@ Eigen::Vector3f fit_translation(std::span<const Eigen::Vector3f> vertices, const
 }
 
 Framing frame_animal(std::span<const Eigen::Vector3f> vertices, cv::Size picture_px,
-                     const FramingHabits& habits, run::Rng& rng) {
+                     const FramingHabits& habits, manifests::Rng& rng) {
   Extent flat;
   for (const Eigen::Vector3f& vertex : vertices) flat.add(vertex.head<2>().cast<double>());
   const double aspect = (flat.right - flat.left) / (flat.bottom - flat.top);

@@ -9,7 +9,7 @@
 #include <opencv2/core.hpp>
 #include <span>
 
-#include "pipeline/run/random.h"
+#include "manifests/random.h"
 #include "pipeline/world/scene.h"
 
 namespace q3d::pipeline::world {
@@ -36,6 +36,6 @@ Eigen::Vector3f fit_translation(std::span<const Eigen::Vector3f> vertices, const
                                 const cv::Point2d& centre_px, double side_px);
 
 Framing frame_animal(std::span<const Eigen::Vector3f> vertices, cv::Size picture_px,
-                     const FramingHabits& habits, run::Rng& rng);
+                     const FramingHabits& habits, manifests::Rng& rng);
 
 }  // namespace q3d::pipeline::world

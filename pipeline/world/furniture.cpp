@@ -16,7 +16,7 @@ struct Spot {
 
 // A place on the ground beyond the animal. The depth is drawn, then the height follows from the plane.
 Spot spot_behind(const cv::Mat& picture, const PictureCamera& camera, const Ground& ground,
-                 float subject_distance, run::Rng& rng) {
+                 float subject_distance, manifests::Rng& rng) {
   const double column = rng.uniform(-0.05, 1.05) * picture.cols;
   const double depth = subject_distance * std::exp(rng.uniform(0.15, 1.4));
   const double x = (column - camera.centre_x_px) / camera.focal_px * depth;
@@ -24,7 +24,7 @@ Spot spot_behind(const cv::Mat& picture, const PictureCamera& camera, const Grou
   return {{column, camera.centre_y_px + camera.focal_px * y / depth}, camera.focal_px / depth};
 }
 
-void paint_trunk(cv::Mat& picture, const Spot& spot, const Backdrop& backdrop, run::Rng& rng) {
+void paint_trunk(cv::Mat& picture, const Spot& spot, const Backdrop& backdrop, manifests::Rng& rng) {
   const double width = spot.unit_px * rng.uniform(0.08, 0.4);
   const double lean = rng.normal(0.0, 0.08) * picture.rows;
   const Colour bark = blend(rgb(52, 42, 34), rgb(128, 112, 92), static_cast<float>(rng.uniform()));
@@ -45,7 +45,7 @@ void paint_trunk(cv::Mat& picture, const Spot& spot, const Backdrop& backdrop, r
   }
 }
 
-void paint_bush(cv::Mat& picture, const Spot& spot, const Backdrop& backdrop, run::Rng& rng) {
+void paint_bush(cv::Mat& picture, const Spot& spot, const Backdrop& backdrop, manifests::Rng& rng) {
   const double radius = spot.unit_px * rng.uniform(0.25, 0.9);
   for (int leaf = 0; leaf < 70; ++leaf) {
     const double angle = rng.uniform(0.0, 2.0 * CV_PI), reach = radius * std::sqrt(rng.uniform());
@@ -60,7 +60,7 @@ void paint_bush(cv::Mat& picture, const Spot& spot, const Backdrop& backdrop, ru
   }
 }
 
-void paint_stone(cv::Mat& picture, const Spot& spot, run::Rng& rng) {
+void paint_stone(cv::Mat& picture, const Spot& spot, manifests::Rng& rng) {
   const double width = spot.unit_px * rng.uniform(0.15, 0.8), height = width * rng.uniform(0.35, 0.8);
   const Colour stone = blend(rgb(92, 86, 80), rgb(176, 170, 160), static_cast<float>(rng.uniform()));
   std::vector<cv::Point> outline;
@@ -77,7 +77,7 @@ void paint_stone(cv::Mat& picture, const Spot& spot, run::Rng& rng) {
   cv::fillPoly(picture, std::vector<std::vector<cv::Point>>{outline}, to_bgr(stone), cv::LINE_AA);
 }
 
-void paint_fence(cv::Mat& picture, const Spot& spot, run::Rng& rng) {
+void paint_fence(cv::Mat& picture, const Spot& spot, manifests::Rng& rng) {
   const Colour wood = blend(rgb(88, 70, 54), rgb(226, 224, 218), static_cast<float>(rng.uniform()));
   const double height = 0.7 * spot.unit_px, gap = spot.unit_px * rng.uniform(0.5, 1.2);
   const int thick = std::max(1, static_cast<int>(0.05 * spot.unit_px));
@@ -93,7 +93,7 @@ void paint_fence(cv::Mat& picture, const Spot& spot, run::Rng& rng) {
   }
 }
 
-void paint_cupboard(cv::Mat& picture, const Spot& spot, const Backdrop& backdrop, run::Rng& rng) {
+void paint_cupboard(cv::Mat& picture, const Spot& spot, const Backdrop& backdrop, manifests::Rng& rng) {
   const double width = spot.unit_px * rng.uniform(0.4, 1.5), height = spot.unit_px * rng.uniform(0.4, 2.0);
   const Colour cloth(static_cast<float>(rng.uniform(0.1, 0.9)), static_cast<float>(rng.uniform(0.1, 0.8)),
                      static_cast<float>(rng.uniform(0.1, 0.8)));
@@ -108,7 +108,7 @@ void paint_cupboard(cv::Mat& picture, const Spot& spot, const Backdrop& backdrop
 }  // namespace
 
 void paint_thing(cv::Mat& picture, const Backdrop& backdrop, const PictureCamera& camera,
-                 const Ground& ground, float subject_distance, run::Rng& rng) {
+                 const Ground& ground, float subject_distance, manifests::Rng& rng) {
   const Spot spot = spot_behind(picture, camera, ground, subject_distance, rng);
   switch (backdrop.place) {
     case Place::forest:

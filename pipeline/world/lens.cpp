@@ -11,7 +11,7 @@
 namespace q3d::pipeline::world {
 namespace {
 
-void smear(cv::Mat& picture, run::Rng& rng) {
+void smear(cv::Mat& picture, manifests::Rng& rng) {
   const int length = 3 + 2 * rng.below(4);
   const double angle = rng.normal(0.0, 0.5);
   cv::Mat1f kernel(length, length, 0.0F);
@@ -27,7 +27,7 @@ void smear(cv::Mat& picture, run::Rng& rng) {
 }
 
 // Contrast, exposure and white balance, one curve a channel.
-void grade(cv::Mat& picture, const LensHabits& habits, run::Rng& rng) {
+void grade(cv::Mat& picture, const LensHabits& habits, manifests::Rng& rng) {
   const double contrast = habits.contrast * std::exp(rng.normal(0.0, 0.08));
   const double brightness = rng.normal(0.0, 8.0);
   const double warm = rng.normal(0.0, habits.warmth_spread),
@@ -56,7 +56,7 @@ void grade(cv::Mat& picture, const LensHabits& habits, run::Rng& rng) {
 }
 
 // A camera trap's night picture: no colour, a bright middle and dark corners.
-void infrared(cv::Mat& picture, run::Rng& rng) {
+void infrared(cv::Mat& picture, manifests::Rng& rng) {
   const double reach = rng.uniform(0.6, 1.1);
   const cv::Point2d middle(picture.cols * rng.uniform(0.4, 0.6), picture.rows * rng.uniform(0.4, 0.7));
   for (int row = 0; row < picture.rows; ++row) {
@@ -71,7 +71,7 @@ void infrared(cv::Mat& picture, run::Rng& rng) {
   }
 }
 
-cv::Rect stamp(cv::Mat& picture, run::Rng& rng) {
+cv::Rect stamp(cv::Mat& picture, manifests::Rng& rng) {
   const int height = std::max(12, picture.rows / 14);
   const cv::Rect bar(0, rng.chance(0.7) ? picture.rows - height : 0, picture.cols, height);
   cv::rectangle(picture, bar, cv::Scalar(12, 12, 12), cv::FILLED);
@@ -84,7 +84,7 @@ cv::Rect stamp(cv::Mat& picture, run::Rng& rng) {
   return bar;
 }
 
-void add_noise(cv::Mat& picture, double deviation, run::Rng& rng) {
+void add_noise(cv::Mat& picture, double deviation, manifests::Rng& rng) {
   cv::Mat grain(picture.size(), CV_16SC3);
   cv::RNG generator(rng.next());
   generator.fill(grain, cv::RNG::NORMAL, 0.0, deviation);
@@ -93,7 +93,7 @@ void add_noise(cv::Mat& picture, double deviation, run::Rng& rng) {
 
 }  // namespace
 
-cv::Rect expose(cv::Mat& picture, const LensHabits& habits, run::Rng& rng) {
+cv::Rect expose(cv::Mat& picture, const LensHabits& habits, manifests::Rng& rng) {
   const double sigma = rng.uniform(habits.blur_low, habits.blur_high);
   if (sigma > 0.3) cv::GaussianBlur(picture, picture, {}, sigma);
   if (rng.chance(habits.motion)) smear(picture, rng);
@@ -103,7 +103,7 @@ cv::Rect expose(cv::Mat& picture, const LensHabits& habits, run::Rng& rng) {
   return rng.chance(habits.stamped) ? stamp(picture, rng) : cv::Rect();
 }
 
-std::vector<std::uint8_t> encode_jpeg(const cv::Mat& picture, const LensHabits& habits, run::Rng& rng) {
+std::vector<std::uint8_t> encode_jpeg(const cv::Mat& picture, const LensHabits& habits, manifests::Rng& rng) {
   const int quality = habits.quality_low + rng.below(habits.quality_high - habits.quality_low + 1);
   std::vector<std::uint8_t> bytes;
   if (!cv::imencode(".jpg", picture, bytes, {cv::IMWRITE_JPEG_QUALITY, quality})) {

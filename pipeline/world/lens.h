@@ -5,7 +5,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "pipeline/run/random.h"
+#include "manifests/random.h"
 
 namespace q3d::pipeline::world {
 
@@ -22,9 +22,9 @@ struct LensHabits {
 
 // Changes the picture (BGR, 8 bit) in place. Returns the bar that the camera has stamped over it, or an empty
 // one.
-cv::Rect expose(cv::Mat& picture, const LensHabits& habits, run::Rng& rng);
+cv::Rect expose(cv::Mat& picture, const LensHabits& habits, manifests::Rng& rng);
 
 // JPEG bytes. Throws std::runtime_error when the encoder fails.
-std::vector<std::uint8_t> encode_jpeg(const cv::Mat& picture, const LensHabits& habits, run::Rng& rng);
+std::vector<std::uint8_t> encode_jpeg(const cv::Mat& picture, const LensHabits& habits, manifests::Rng& rng);
 
 }  // namespace q3d::pipeline::world

@@ -5,7 +5,7 @@
 #include <numeric>
 #include <utility>
 
-#include "pipeline/run/random.h"
+#include "manifests/random.h"
 
 namespace q3d::pipeline::world {
 namespace {
@@ -26,7 +26,7 @@ float mix(float a, float b, float t) {
 }  // namespace
 
 NoiseField::NoiseField(std::uint64_t seed) {
-  run::Rng rng(seed, {0x6E6F697365});
+  manifests::Rng rng(seed, {0x6E6F697365});
   std::iota(order_.begin(), order_.end(), std::uint8_t{0});
   for (int i = 255; i > 0; --i) std::swap(order_[i], order_[rng.below(i + 1)]);
   for (float& value : value_) value = static_cast<float>(rng.uniform(-1.0, 1.0));

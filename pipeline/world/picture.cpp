@@ -31,7 +31,7 @@ enum Purpose : std::uint64_t {
 
 constexpr double kLeastVisible = 0.45;  // share of the animal that occluders may not hide
 
-Light draw_light(const Domain& domain, const Ground& ground, const Backdrop& backdrop, run::Rng& rng) {
+Light draw_light(const Domain& domain, const Ground& ground, const Backdrop& backdrop, manifests::Rng& rng) {
   Light light;
   const bool sunny = rng.chance(domain.sunny) && backdrop.place != Place::room;
   const double high = rng.uniform(22.0, 75.0) * std::numbers::pi / 180.0;
@@ -55,7 +55,7 @@ Light draw_light(const Domain& domain, const Ground& ground, const Backdrop& bac
 
 // Puts something in front of the animal, unless it would hide too much of it.
 void occlude(cv::Mat& picture, cv::Mat1b& cover, const cv::Mat1b& silhouette, const Backdrop& backdrop,
-             run::Rng& rng) {
+             manifests::Rng& rng) {
   const cv::Rect animal = cv::boundingRect(silhouette);
   const int count = 1 + (rng.chance(0.25) ? 1 : 0);
   for (int i = 0; i < count; ++i) {
@@ -110,17 +110,17 @@ PictureRenderer::PictureRenderer(std::uint64_t seed, int picture_px)
       landmarks_{animal3d_landmarks(model_.rest()), animal3d_landmarks(model_.rest()),
                  superanimal_landmarks(model_.rest()), animal_kingdom_landmarks(model_.rest())} {}
 
-run::Rng PictureRenderer::stream(const PicturePlan& plan, std::uint64_t purpose) const {
+manifests::Rng PictureRenderer::stream(const PicturePlan& plan, std::uint64_t purpose) const {
   const int number = purpose == individual ? plan.individual : plan.index;
-  return run::Rng(seed_, {static_cast<std::uint64_t>(plan.set), plan.test ? 1ULL : 0ULL, purpose,
-                          static_cast<std::uint64_t>(number)});
+  return manifests::Rng(seed_, {static_cast<std::uint64_t>(plan.set), plan.test ? 1ULL : 0ULL, purpose,
+                                static_cast<std::uint64_t>(number)});
 }
 
 std::vector<Picture> PictureRenderer::render(std::span<const PicturePlan> plans) const {
   std::vector<Subject> subjects;
   std::vector<Posture> postures;
   for (const PicturePlan& plan : plans) {
-    run::Rng who = stream(plan, individual), when = stream(plan, moment);
+    manifests::Rng who = stream(plan, individual), when = stream(plan, moment);
     subjects.push_back(draw_subject(species_table()[static_cast<std::size_t>(plan.species)],
                                     domain_of(plan.set), model_.shapes(), who, when));
     postures.push_back(subjects.back().posture);
@@ -134,7 +134,7 @@ std::vector<Picture> PictureRenderer::render(std::span<const PicturePlan> plans)
 
 Picture PictureRenderer::render_one(const PicturePlan& plan, const Subject& subject, const Body& body) const {
   const Domain& domain = domain_of(plan.set);
-  run::Rng rng = stream(plan, size);
+  manifests::Rng rng = stream(plan, size);
   const cv::Size2d units =
       domain.sizes[static_cast<std::size_t>(rng.below(static_cast<int>(domain.sizes.size())))];
   Picture result;
@@ -158,7 +158,7 @@ Picture PictureRenderer::render_one(const PicturePlan& plan, const Subject& subj
   const Backdrop backdrop = draw_palette(subject.place, rng);
   cv::Mat picture =
       paint_backdrop(backdrop, truth.size_px, camera, ground, truth.framing.translation.z(), noise_, rng);
-  run::Rng sun = stream(plan, light);
+  manifests::Rng sun = stream(plan, light);
   const Light sunlight = draw_light(domain, ground, backdrop, sun);
   animal.cast_shadow(picture, camera, ground, sunlight);
   const cv::Mat1b silhouette =

@@ -49,7 +49,7 @@ class PictureRenderer {
 
  private:
   Picture render_one(const PicturePlan& plan, const Subject& subject, const Body& body) const;
-  run::Rng stream(const PicturePlan& plan, std::uint64_t purpose) const;
+  manifests::Rng stream(const PicturePlan& plan, std::uint64_t purpose) const;
 
   std::uint64_t seed_;
   int picture_px_;

@@ -32,7 +32,7 @@ std::string_view coco_class(const Species& species) {
 }
 
 // Numbers are apart for every set and split, so that no two files seem to be the same photograph.
-std::string animal3d_name(const PicturePlan& plan, const Species& species, run::Rng& rng) {
+std::string animal3d_name(const PicturePlan& plan, const Species& species, manifests::Rng& rng) {
   const std::string folder =
       fmt::format("images/{}/{}", plan.test ? "test" : "train", with_underscores(species.name));
   const int number = 2 * plan.index + (plan.test ? 1 : 0);
@@ -50,8 +50,8 @@ std::string ctrlani3d_name(const PicturePlan& plan, const Species& species) {
 
 // Animal Kingdom's films have names of eight letters, frames have numbers.
 std::string kingdom_name(const PicturePlan& plan, std::uint64_t seed) {
-  run::Rng film(seed,
-                {static_cast<std::uint64_t>(plan.set), naming, static_cast<std::uint64_t>(plan.individual)});
+  manifests::Rng film(
+      seed, {static_cast<std::uint64_t>(plan.set), naming, static_cast<std::uint64_t>(plan.individual)});
   std::string name;
   for (int letter = 0; letter < 5; ++letter) name += static_cast<char>('A' + film.below(26));
   for (int rest = plan.individual, letter = 0; letter < 3; ++letter, rest /= 26) {
@@ -124,7 +124,7 @@ std::vector<PicturePlan> plan_split(SetId set, bool test, double share, std::uin
   for (std::size_t i = 0; i < counts.size(); ++i)
     shown.insert(shown.end(), static_cast<std::size_t>(counts[i]), static_cast<int>(i));
   const std::uint64_t split_key = 2 * static_cast<std::uint64_t>(set) + (test ? 1 : 0);
-  run::Rng shuffle(seed, {split_key, order});
+  manifests::Rng shuffle(seed, {split_key, order});
   for (int i = groups - 1; i > 0; --i) {
     std::swap(shown[static_cast<std::size_t>(i)], shown[static_cast<std::size_t>(shuffle.below(i + 1))]);
   }
@@ -140,7 +140,7 @@ std::vector<PicturePlan> plan_split(SetId set, bool test, double share, std::uin
     plan.species = shown[static_cast<std::size_t>(plan.individual)];
     plan.image_id = first_id + index;
     const Species& row = species[static_cast<std::size_t>(plan.species)];
-    run::Rng rng(seed, {split_key, naming, static_cast<std::uint64_t>(index)});
+    manifests::Rng rng(seed, {split_key, naming, static_cast<std::uint64_t>(index)});
     switch (set) {
       case SetId::animal3d:
         plan.image = animal3d_name(plan, row, rng);

@@ -116,7 +116,7 @@ Eigen::VectorXd ShapeSpace::typical(const Species& species) const {
   return mean + factor.transpose() * measures.cwiseMax(-kFarthest).cwiseMin(kFarthest);
 }
 
-std::array<float, smal::kNumBetas> ShapeSpace::draw(const Species& species, run::Rng& rng) const {
+std::array<float, smal::kNumBetas> ShapeSpace::draw(const Species& species, manifests::Rng& rng) const {
   const Eigen::MatrixXd& factor = family_factors_[static_cast<std::size_t>(species.family)];
   Eigen::VectorXd measures(factor.rows());
   for (double& measure : measures) measure = kIndividual * std::clamp(rng.normal(), -2.5, 2.5);

@@ -5,7 +5,7 @@
 #include <array>
 #include <vector>
 
-#include "pipeline/run/random.h"
+#include "manifests/random.h"
 #include "pipeline/world/bodies.h"
 #include "pipeline/world/species.h"
 
@@ -23,7 +23,7 @@ class ShapeSpace {
   Eigen::VectorXd typical(const Species& species) const;
 
   // An individual: about the typical one, at half the family's deviations.
-  std::array<float, smal::kNumBetas> draw(const Species& species, run::Rng& rng) const;
+  std::array<float, smal::kNumBetas> draw(const Species& species, manifests::Rng& rng) const;
 
  private:
   struct Length {  // of a body part: the distance of two groups of vertices

@@ -18,7 +18,7 @@ std::string_view to_string(Family family) {
   return kNames[static_cast<std::size_t>(family)];
 }
 
-Coat draw_coat(const Species& species, run::Rng& rng) {
+Coat draw_coat(const Species& species, manifests::Rng& rng) {
   Coat coat = species.coats[static_cast<std::size_t>(rng.below(static_cast<int>(species.coats.size())))];
   const auto gain = static_cast<float>(std::clamp(std::exp(rng.normal(0.0, 0.10)), 0.75, 1.3));
   const Colour tint(static_cast<float>(1.0 + rng.normal(0.0, 0.03)), 1.0F,

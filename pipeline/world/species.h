@@ -44,6 +44,6 @@ struct Species {
 std::span<const Species> species_table();
 
 // An individual's coat: one of the species' variants with its own shade.
-Coat draw_coat(const Species& species, run::Rng& rng);
+Coat draw_coat(const Species& species, manifests::Rng& rng);
 
 }  // namespace q3d::pipeline::world

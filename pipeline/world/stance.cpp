@@ -27,7 +27,7 @@ bool is_leg(int joint) {
 // to the right.
 class Posing {
  public:
-  Posing(Stance& stance, run::Rng& rng) : stance_(stance), rng_(rng) {}
+  Posing(Stance& stance, manifests::Rng& rng) : stance_(stance), rng_(rng) {}
 
   void turn(int joint, int axis, double degrees) {
     stance_.pose[static_cast<std::size_t>(3 * joint + axis)] += static_cast<float>(degrees * kDegree);
@@ -45,7 +45,7 @@ class Posing {
 
  private:
   Stance& stance_;
-  run::Rng& rng_;
+  manifests::Rng& rng_;
 };
 
 void Posing::add_motion(double spread, bool legs) {
@@ -89,7 +89,7 @@ void rear(Stance& stance, Posing& posing) {
   posing.bend(kNeck, -0.4 * up);
 }
 
-void leap(Stance& stance, Posing& posing, run::Rng& rng) {
+void leap(Stance& stance, Posing& posing, manifests::Rng& rng) {
   stance.pitch = posing.about(8.0, 12.0) * kDegree;
   stance.lift = rng.uniform(0.1, 0.5);
   for (int side = 0; side < 2; ++side) {
@@ -98,7 +98,7 @@ void leap(Stance& stance, Posing& posing, run::Rng& rng) {
   }
 }
 
-void roll_over(Stance& stance, Posing& posing, run::Rng& rng) {
+void roll_over(Stance& stance, Posing& posing, manifests::Rng& rng) {
   stance.roll = (rng.chance(0.5) ? 1.0 : -1.0) * rng.uniform(65.0, 150.0) * kDegree;
   for (int side = 0; side < 2; ++side) {
     posing.leg(kForeLegs[side], {posing.about(5.0, 18.0), 30.0, -45.0, -10.0}, 12.0);
@@ -116,7 +116,7 @@ void bow(Stance& stance, Posing& posing) {
   posing.bend(kNeck, 0.8 * down);
 }
 
-void extreme(Stance& stance, Posing& posing, run::Rng& rng) {
+void extreme(Stance& stance, Posing& posing, manifests::Rng& rng) {
   switch (rng.below(4)) {
     case 0:
       return rear(stance, posing);
@@ -131,7 +131,7 @@ void extreme(Stance& stance, Posing& posing, run::Rng& rng) {
 
 }  // namespace
 
-Stance draw_stance(const StanceHabits& habits, run::Rng& rng) {
+Stance draw_stance(const StanceHabits& habits, manifests::Rng& rng) {
   constexpr double kCalm = 0.6;  // a resting or straining animal's back, neck and tail move less
   Stance stance;
   Posing posing(stance, rng);

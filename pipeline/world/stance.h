@@ -3,7 +3,7 @@
 
 #include <array>
 
-#include "pipeline/run/random.h"
+#include "manifests/random.h"
 #include "pipeline/world/bodies.h"
 
 namespace q3d::pipeline::world {
@@ -23,6 +23,6 @@ struct StanceHabits {
 
 // Most animals stand, walk, run, graze or crouch: poses from the synthetic pose prior, within the ranges of
 // the joints. The resting and the extreme ones are postures of their own, which the prior finds unlikely.
-Stance draw_stance(const StanceHabits& habits, run::Rng& rng);
+Stance draw_stance(const StanceHabits& habits, manifests::Rng& rng);
 
 }  // namespace q3d::pipeline::world

@@ -16,13 +16,13 @@ Eigen::Matrix3d about(const Eigen::Vector3d& axis, double radians) {
 
 // Turn about the vertical between the animal's axis and the picture: 0 = seen from its right, head to the
 // right.
-double draw_yaw(double side_view, run::Rng& rng) {
+double draw_yaw(double side_view, manifests::Rng& rng) {
   const double side = rng.chance(0.5) ? 0.0 : std::numbers::pi;
   return rng.chance(side_view) ? side + rng.normal(0.0, 26.0) * kDegree
                                : rng.uniform(-std::numbers::pi, std::numbers::pi);
 }
 
-Place draw_place(const std::array<double, kPlaces>& weights, run::Rng& rng) {
+Place draw_place(const std::array<double, kPlaces>& weights, manifests::Rng& rng) {
   double total = 0.0;
   for (const double weight : weights) total += weight;
   double left = rng.uniform() * total;
@@ -35,8 +35,8 @@ Place draw_place(const std::array<double, kPlaces>& weights, run::Rng& rng) {
 
 }  // namespace
 
-Subject draw_subject(const Species& species, const Domain& domain, const ShapeSpace& shapes, run::Rng& who,
-                     run::Rng& when) {
+Subject draw_subject(const Species& species, const Domain& domain, const ShapeSpace& shapes,
+                     manifests::Rng& who, manifests::Rng& when) {
   Subject subject;
   subject.posture.betas = shapes.draw(species, who);
   subject.coat = draw_coat(species, who);

@@ -17,7 +17,7 @@ struct Subject {
 };
 
 // `who` decides individual, coat and place, `when` decides pose and view: frames of one film share the first.
-Subject draw_subject(const Species& species, const Domain& domain, const ShapeSpace& shapes, run::Rng& who,
-                     run::Rng& when);
+Subject draw_subject(const Species& species, const Domain& domain, const ShapeSpace& shapes,
+                     manifests::Rng& who, manifests::Rng& when);
 
 }  // namespace q3d::pipeline::world

@@ -55,7 +55,7 @@ std::span<const SuperAnimalSource> superanimal_sources() {
   return kSources;
 }
 
-int draw_source(const Species& species, run::Rng& rng) {
+int draw_source(const Species& species, manifests::Rng& rng) {
   std::array<double, 6> weights{75, 25, 0, 0, 0, 0};
   if (species.name == "labrador") {  // AwA has no folder for it
     weights = {0, 20, 20, 60, 0, 0};
@@ -76,7 +76,7 @@ int draw_source(const Species& species, run::Rng& rng) {
   return awa;
 }
 
-std::string source_file_name(int source, const Species& species, int image_id, run::Rng& rng) {
+std::string source_file_name(int source, const Species& species, int image_id, manifests::Rng& rng) {
   switch (source) {
     case awa:
       return fmt::format("{}_{}_{}.jpg", with_plus(species.name), 10000 + rng.below(1900), image_id);

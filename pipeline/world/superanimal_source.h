@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "pipeline/run/random.h"
+#include "manifests/random.h"
 #include "pipeline/world/species.h"
 
 namespace q3d::pipeline::world {
@@ -23,10 +23,10 @@ struct SuperAnimalSource {
 std::span<const SuperAnimalSource> superanimal_sources();
 
 // Row of superanimal_sources() for one more picture of a species.
-int draw_source(const Species& species, run::Rng& rng);
+int draw_source(const Species& species, manifests::Rng& rng);
 
 // The file's name as the collection and SuperAnimal's converter make it: "<stem>_<image id>.jpg"; for some
 // collections with the folder, even the whole path, of the machine that converted it.
-std::string source_file_name(int source, const Species& species, int image_id, run::Rng& rng);
+std::string source_file_name(int source, const Species& species, int image_id, manifests::Rng& rng);
 
 }  // namespace q3d::pipeline::world

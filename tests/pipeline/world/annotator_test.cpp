@@ -27,7 +27,7 @@ TEST(Annotate, LabelsAtTheRateOfWhatCanBeSeen) {
   auto seen = in_the_open();
   seen[1].self_hidden = true;
   seen[2].occluded = true;
-  run::Rng rng(1);
+  manifests::Rng rng(1);
   std::array<int, 3> given{};
   for (int i = 0; i < kAnimals; ++i) {
     const auto labels = annotate(two_paws_and_a_nose(), seen, 100.0, habits, rng);
@@ -42,7 +42,7 @@ TEST(Annotate, NeverLabelsWhatIsOutsideOrDoesNotExist) {
   auto seen = in_the_open();
   seen[0].inside = false;
   seen[2].exists = false;
-  run::Rng rng(2);
+  manifests::Rng rng(2);
   for (int i = 0; i < 200; ++i) {
     const auto labels = annotate(two_paws_and_a_nose(), seen, 100.0, {.visible = 1.0, .swapped = 0.0}, rng);
     EXPECT_FALSE(labels[0].given);
@@ -55,7 +55,7 @@ TEST(Annotate, JitterHasTheStatedDeviation) {
   const LabelHabits habits{.visible = 1.0, .swapped = 0.0, .jitter = 0.01, .vague_factor = 3.0};
   auto landmarks = two_paws_and_a_nose();
   landmarks[2].vague = true;
-  run::Rng rng(3);
+  manifests::Rng rng(3);
   double clear = 0.0, vague = 0.0;
   for (int i = 0; i < kAnimals; ++i) {
     const auto labels = annotate(landmarks, in_the_open(), 200.0, habits, rng);
@@ -68,7 +68,7 @@ TEST(Annotate, JitterHasTheStatedDeviation) {
 
 TEST(Annotate, SwapsExchangeTheTwoSidesAtTheStatedRate) {
   const LabelHabits habits{.visible = 1.0, .swapped = 0.2, .jitter = 0.0};
-  run::Rng rng(4);
+  manifests::Rng rng(4);
   int swapped = 0;
   for (int i = 0; i < kAnimals; ++i) {
     const auto labels = annotate(two_paws_and_a_nose(), in_the_open(), 100.0, habits, rng);

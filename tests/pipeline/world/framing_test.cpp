@@ -49,7 +49,7 @@ TEST(FrameAnimal, ABoxWithoutErrorIsTheSilhouettesBoundingBox) {
   const FramingHabits exact{
       .fill_low = 0.5, .fill_high = 0.9, .truncated = 0.0, .box_bias = 1.0, .box_spread = 0.0};
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
-    run::Rng rng(seed);
+    manifests::Rng rng(seed);
     const Framing framing = frame_animal(corners, {320, 240}, exact, rng);
     double left = 1e9, right = -1e9, top = 1e9, bottom = -1e9;
     for (const Eigen::Vector3f& corner : corners) {
@@ -72,7 +72,7 @@ TEST(FrameAnimal, ATruncatedAnimalsBoxStaysInsideThePicture) {
       .fill_low = 0.8, .fill_high = 1.1, .truncated = 1.0, .box_bias = 1.03, .box_spread = 0.03};
   int at_border = 0;
   for (std::uint64_t seed = 0; seed < 40; ++seed) {
-    run::Rng rng(seed);
+    manifests::Rng rng(seed);
     const cv::Rect box = frame_animal(corners, {320, 240}, cut, rng).box;
     EXPECT_EQ(box & cv::Rect(0, 0, 320, 240), box);
     EXPECT_GT(box.area(), 0);

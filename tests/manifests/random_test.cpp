@@ -1,4 +1,4 @@
-#include "manifests/uniform.h"
+#include "manifests/random.h"
 
 #include <gtest/gtest.h>
 
@@ -20,6 +20,14 @@ TEST(Uniform, WholeNumbersAreBelowTheCountAndEachOccursAsOften) {
   for (int i = 0; i < 70'000; ++i) ++seen.at(uniform_below(engine, seen.size()));
   // Five standard deviations of a binomial number: sqrt(70000 / 7 * 6 / 7) is 93.
   for (const int count : seen) EXPECT_NEAR(count, 10'000, 465);
+}
+
+// The first numbers of the reference implementation (prng.di.unimi.it/splitmix64.c) for the seed 1234567.
+TEST(Rng, GivesTheNumbersOfSplitMix64) {
+  Rng rng(1234567);
+  EXPECT_EQ(rng.next(), 6457827717110365317ULL);
+  EXPECT_EQ(rng.next(), 3203168211198807973ULL);
+  EXPECT_EQ(rng.next(), 9817491932198370423ULL);
 }
 
 }  // namespace
