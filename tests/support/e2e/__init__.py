@@ -7,6 +7,7 @@ __main__.py, which also tells it where the program is. The parts:
     program    run and start the program; make it stop, hang or fail at an exact point; kill and resume it
     scene      Scene: drawn pictures, a tiny network, a config and calibrated thresholds
     pictures   draw pictures and annotations, give bodies to annotations, make networks and the rendered world
+    intake     IntakeCase: label files as people have them, over pictures with a dot at each keypoint
     datasets   read what the program wrote: verdicts, labels, digests, journals; damage files
 """
 
