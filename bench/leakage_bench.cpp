@@ -83,7 +83,7 @@ void hash_pictures(benchmark::State& state) {
 }
 BENCHMARK(hash_pictures)->Unit(benchmark::kMillisecond)->UseRealTime()->Iterations(1);
 
-// What a second run does: reads the cache.
+// Measures a second run, which reads the cache.
 void hashes_from_cache(benchmark::State& state) {
   const PictureFiles made;
   pipeline::leakage::PictureHashes(made.cache()).add(made.files, /*quiet=*/true);
@@ -96,7 +96,7 @@ void hashes_from_cache(benchmark::State& state) {
 }
 BENCHMARK(hashes_from_cache)->Unit(benchmark::kMillisecond)->UseRealTime();
 
-// As DCT hashes are, half of the bits are set. One picture in ten is a frame of a clip of ten that differ by
+// Half of the bits are set, as in DCT hashes. One picture in ten is a frame of a clip of ten that differ by
 // up to four bits.
 std::vector<PictureHash> made_hashes(std::size_t count) {
   std::mt19937_64 engine(1);

@@ -11,7 +11,7 @@
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
-# In the build folder the program finds LibTorch where it was found; installed, relative to itself.
+# A program in the build folder looks for LibTorch where CMake found it. An installed program looks beside itself.
 if(LIBTORCH_ROOT)
   set(CMAKE_BUILD_RPATH "${LIBTORCH_ROOT}/lib")
 endif()

@@ -66,7 +66,7 @@ function(q3d_include_root target scope)
   target_include_directories(${target} ${scope} "$<BUILD_INTERFACE:${root}>")
 endfunction()
 
-# What tools/check_rooms.py reads: a line a room.
+# tools/check_rooms.py reads this file. Each room adds a line.
 file(WRITE "${PROJECT_BINARY_DIR}/rooms.tsv" "")
 
 # q3d_room(JOB text [SOURCES ...] [PUBLIC libs] [PRIVATE libs] [TORCH] [PLAIN sources] [INSTALL])

@@ -1,4 +1,4 @@
-// What calibration found for the candidates that share thresholds.
+// The result of calibration for the candidates that share thresholds.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
-// For code that goes through the enumerators of verdicts: all their names in order, and which verdicts are
-// kept.
+// This header is for code that goes through the enumerators of verdicts. It has all their names in order, and
+// says which verdicts are kept.
 #pragma once
 
 #include <span>
@@ -10,12 +10,12 @@
 
 namespace q3d::manifests {
 
-// In the order of the enumerators, whose values count up from 0.
+// The names are in the order of the enumerators, whose values count up from 0.
 std::span<const std::string_view> reason_names();
 std::span<const std::string_view> verdict_names();
 std::span<const std::string_view> label_kind_names();
 
-// Whether a candidate with this verdict has a row in a shard.
+// Returns whether a candidate with this verdict has a row in a shard.
 constexpr bool is_kept(Verdict verdict) {
   return verdict == Verdict::retained || verdict == Verdict::refined;
 }

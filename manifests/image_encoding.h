@@ -1,4 +1,4 @@
-// How a shard holds its pictures.
+// The forms in which a shard can hold its pictures.
 #pragma once
 
 #include <cstdint>

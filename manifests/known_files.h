@@ -1,4 +1,4 @@
-// Where the files lie whose digests earlier runs have remembered.
+// Earlier runs remember the digests of files. This header finds a file by its digest.
 #pragma once
 
 #include <filesystem>

@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::string_view kFormat = "quadruped3d-shard";
 
-// What a reader without docs/shard-format.md needs to know about each column.
+// Returns what a reader without docs/shard-format.md needs to know about each column.
 std::string describe_columns() {
   nlohmann::json columns;
   for (const ShardColumn& column : shard_columns()) {

@@ -48,8 +48,8 @@ struct ShardSample {
   smal::CropPoints projected_2d{};  // keypoints of the body
 };
 
-// Under which terms the pictures and annotations of a source dataset came, in the words of the build's
-// config; empty where it says nothing.
+// The terms under which the pictures and annotations of a source dataset came, in the words of the build's
+// config. A text is empty where the config says nothing.
 struct DatasetTerms {
   std::string licence{};
   std::string source_url{};

@@ -13,7 +13,7 @@ struct TypeFacts {
   std::string_view name;
   std::size_t size;
 };
-// In the order of ElementType.
+// The entries are in the order of ElementType.
 constexpr std::array<TypeFacts, 6> kTypes{
     {{"float32", 4}, {"float64", 8}, {"int8", 1}, {"uint8", 1}, {"int32", 4}, {"int64", 8}}};
 static_assert(kTypes.size() == static_cast<std::size_t>(ElementType::int64) + 1);

@@ -1,4 +1,4 @@
-// Where the bytes of a table are: in a file on disk, or in memory.
+// The bytes of a table, which are in a file on disk or in memory.
 #pragma once
 
 #include <cstddef>

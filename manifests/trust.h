@@ -1,5 +1,5 @@
-// How far a predicted label can be trusted, beyond its L_proj: scores that need no truth. docs/filters.md
-// says how they are measured, docs/results.md what each is worth.
+// Trust scores say how far a predicted label can be trusted, beyond its L_proj. They need no truth.
+// docs/filters.md says how they are measured, docs/results.md what each is worth.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// From the decoder's numbers to a body in front of the crop's camera. Official code: PRIMA.forward_step.
+// Makes a body in front of the crop's camera from the decoder's numbers. Official code: PRIMA.forward_step.
 #pragma once
 
 #include <torch/types.h>

@@ -5,7 +5,7 @@ namespace {
 
 constexpr double kNormEpsilon = 1e-5;
 
-// How the decoder lays out the 192 image tokens.
+// The grid in which the decoder lays out the 192 image tokens.
 struct TokenGrid {
   std::int64_t rows, columns;
   double x_scale;  // from crop units to the width that the columns cover
@@ -105,7 +105,7 @@ class DecoderLayer : public torch::nn::Module {
   double dropout_;
 };
 
-// What the keypoints read off the tokens after a layer change in the input of the next one.
+// Keypoints are read off the tokens after a layer. They change the input of the next layer by these features.
 struct Decoder::KeypointUpdate {
   torch::Tensor keypoints_2d;  // (B, 26, 2) crop units
   torch::Tensor keypoints_3d;  // (B, 26, 3)

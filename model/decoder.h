@@ -20,8 +20,8 @@ inline constexpr std::int64_t kPose6d = smal::kNumJoints * 6;
 inline constexpr std::int64_t kBetas = smal::kNumBetas;
 inline constexpr std::int64_t kCamera = 3;
 
-// What test-time adaptation may change: the keypoint embeddings and the three regression heads. Either the
-// network's own (one set for the whole batch) or one set an instance, then with a leading batch axis.
+// Test-time adaptation may change these parameters: the keypoint embeddings and the three regression heads.
+// There is one set for the whole batch (the network's own), or one for each instance, with a batch axis.
 struct AdaptedParameters {
   torch::Tensor keypoint_2d_embeddings;  // (26, D) or (B, 26, D)
   torch::Tensor keypoint_3d_embeddings;

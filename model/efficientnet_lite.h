@@ -41,15 +41,15 @@ class EfficientNetLite : public torch::nn::Module {
   std::vector<std::shared_ptr<InvertedResidual>> blocks_;
 };
 
-// Under this name an encoder holds its EfficientNet.
+// The name under which an encoder holds its EfficientNet.
 inline constexpr const char* kEfficientNetName = "efficientnet";
 
 // The parameter's name inside the EfficientNet (`_blocks.3._bn1.bias`), or nothing when `parameter`, a name
 // in the whole network, belongs to no EfficientNet.
 std::string_view name_in_efficientnet(std::string_view parameter);
 
-// Whether `parameter`, a name in the whole network, belongs to the first convolution or to the first `blocks`
-// blocks of an EfficientNet. With blocks = 0 no parameter does.
+// Returns whether `parameter`, a name in the whole network, belongs to the first convolution or to the first
+// `blocks` blocks of an EfficientNet. With blocks = 0 no parameter does.
 bool is_in_first_blocks(std::string_view parameter, std::int64_t blocks);
 
 }  // namespace q3d::model

@@ -32,7 +32,7 @@ torch::Tensor hat(const torch::Tensor& at, std::int64_t count) {
   return (1.0 - (clamped - centres).abs()).clamp_min(0.0);
 }
 
-// Over samples of known species.
+// Returns the mean loss of the samples whose species is known.
 PartialMean species_loss(const torch::Tensor& logits, const torch::Tensor& species) {
   const torch::Tensor known = (species >= 0).to(logits.scalar_type());
   const torch::Tensor log_shares = torch::log_softmax(logits, 1);
@@ -45,7 +45,7 @@ PartialMean accuracy(const torch::Tensor& logits, const torch::Tensor& species) 
   return {right.sum().to(torch::kFloat32), (species >= 0).sum().to(torch::kFloat32)};
 }
 
-// Over keypoints, by their weights.
+// Returns the mean loss of the keypoints, by their weights.
 PartialMean keypoint_loss(const torch::Tensor& logits, const TokenTargets& targets) {
   const torch::Tensor log_shares = torch::log_softmax(logits, 1).transpose(1, 2);  // (B, 26, 192)
   return {-((log_shares * targets.share).sum(2) * targets.weight).sum(), targets.weight.sum()};

@@ -1,4 +1,4 @@
-// What a training run needs of whatever it trains: a step at a time, and a state that goes on bit for bit.
+// A training run can train all that takes one step at a time and has a state that continues bit for bit.
 #pragma once
 
 #include <torch/types.h>
@@ -14,7 +14,7 @@
 
 namespace q3d::model {
 
-// Of several ranks each holds its part of the joint batch; the parts must be of equal size.
+// With several ranks, each rank holds its part of the joint batch. The parts must be of equal size.
 struct TrainingBatch {
   torch::Tensor images;  // (B, 3, 256, 256) float32, normalised
   Targets targets;
@@ -23,7 +23,7 @@ struct TrainingBatch {
 
 enum class Precision { float32, bfloat16 };  // of the forward pass; weights and losses are float32
 
-// Of the joint batch, so equal on all ranks.
+// The numbers are those of the joint batch, so they are equal on all ranks.
 struct StepReport {
   double loss = 0.0;                                  // weighted total
   std::vector<std::pair<std::string, double>> terms;  // not weighted, in a fixed order

@@ -14,8 +14,8 @@
 
 namespace q3d::model {
 
-// What is known of a batch. All float32 but `family`; flags are 0 or 1. Where a flag is 0 the numbers it
-// speaks of must be finite and are not used.
+// The truth that is known of a batch. All tensors but `family` are float32, and flags are 0 or 1. Where a
+// flag is 0, the numbers that it speaks of are not used, but must be finite.
 struct Targets {
   torch::Tensor keypoints_2d;  // (B, 26, 3): x, y in crop units and a weight
   torch::Tensor keypoints_3d;  // (B, 26, 4): SMAL units in the camera's frame, and a weight

@@ -22,7 +22,7 @@ class MixedPrecision {
   torch::ScalarType previous_dtype_;
 };
 
-// Whether bfloat16 saves time on `device`: GPUs, and x86 processors that multiply it themselves
+// Returns whether bfloat16 saves time on `device`: GPUs and x86 processors that multiply it themselves
 // (AVX512_BF16). On others LibTorch's convolutions in it are about ten times slower than in float32.
 bool bfloat16_is_fast(torch::Device device);
 

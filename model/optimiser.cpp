@@ -23,7 +23,7 @@ bool is_in_efficientnet(std::string_view name) {
   return !name_in_efficientnet(name).empty();
 }
 
-// What a group holds, and how fast it learns.
+// Says which parameters a group holds, and how fast it learns.
 struct Share {
   std::function<bool(std::string_view name)> holds;
   double rate_scale;

@@ -32,7 +32,7 @@ class AdamW {
  public:
   AdamW(std::vector<ParameterGroup> groups, const AdamWOptions& options);
 
-  // Of all groups, in order.
+  // Returns the parameters of all groups, in order.
   std::vector<torch::Tensor> parameters() const;
 
   void zero_grad();
@@ -65,7 +65,7 @@ class AdamW {
   AdamWOptions options_;
 };
 
-// How the EfficientNets of a network learn: what knows pictures already needs small steps.
+// Says how the EfficientNets of a network learn. Weights that know pictures already need small steps.
 struct StemTraining {
   double rate_scale = 1.0;  // beside the rate that their encoder has
   std::int64_t frozen_blocks =

@@ -15,7 +15,8 @@
 namespace q3d::model {
 namespace {
 
-// Of ImageNet, on the scale 0..255: float32 constants in the official code, whatever the network's dtype.
+// Mean and deviation are ImageNet's, on the scale 0..255. The official code has them as float32 constants,
+// whatever the network's dtype.
 torch::Tensor per_channel(double red, double green, double blue, torch::TensorOptions options) {
   return torch::tensor({static_cast<float>(255.0 * red), static_cast<float>(255.0 * green),
                         static_cast<float>(255.0 * blue)})

@@ -13,7 +13,7 @@
 
 namespace q3d::model {
 
-// What the frozen encoders make of a batch of crops; test-time adaptation works from these.
+// The output of the frozen encoders for a batch of crops. Test-time adaptation works from it.
 struct ImageFeatures {
   torch::Tensor image_tokens;  // (B, 192, embed_dim) after the last norm, row-major over 16 x 12 tokens
   torch::Tensor bio_token;     // (B, embed_dim)

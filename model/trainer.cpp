@@ -26,7 +26,7 @@ torch::Tensor body_joints(const torch::Tensor& rotations) {
   return rotations.narrow(1, 1, rotations.size(1) - 1);
 }
 
-// In the order of the log's columns.
+// The terms are in the order of the log's columns.
 std::vector<std::pair<std::string, torch::Tensor>> named_terms(const LossTerms& terms) {
   return {{"keypoints_2d", terms.keypoints_2d},
           {"keypoints_3d", terms.keypoints_3d},

@@ -43,7 +43,7 @@ struct TtaResult {
   // An instance's curves are empty where nothing could be measured: no visible keypoint, or a target or a
   // first prediction that is not finite.
   std::vector<std::vector<double>> l_proj;  // per instance: L_proj of iterates 0..n in crop units
-  // Likewise of the held-out keypoints alone (l_proj is of all visible ones); empty where none is held out.
+  // The same for the held-out keypoints alone (l_proj is of all visible ones). Empty where none is held out.
   std::vector<std::vector<double>> held_out;
   std::vector<std::vector<double>> loss;  // per instance: the objective at iterates 0..n
   std::vector<int> best_iteration;

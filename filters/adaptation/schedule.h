@@ -1,5 +1,5 @@
-// How one sample is adapted and when its adaptation ends. The fidelity rule makes a schedule
-// (filters/fidelity.h), the network's adaptation follows it (model/tta.h); neither knows the other.
+// A schedule says how one sample is adapted and when its adaptation ends. The fidelity rule makes it
+// (filters/fidelity.h) and the network's adaptation follows it (model/tta.h). Neither knows the other.
 #pragma once
 
 #include <array>

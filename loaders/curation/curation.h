@@ -23,9 +23,9 @@ struct CuratedPicture {
 };
 
 struct CurationRule {
-  // For each species of the subset, the names that count as it. A picture belongs to the species that lists
-  // its species name. If none does, the first words of the name are dropped one by one: "polar bear" counts
-  // as the species that lists "bear".
+  // Lists, for each species of the subset, the names that count as it. A picture belongs to the species that
+  // lists its species name. If none does, the first words of the name are dropped one by one: "polar bear"
+  // counts as the species that lists "bear".
   std::map<std::string, std::vector<std::string>> species;
   std::map<std::string, std::int64_t> pictures;  // split -> how many to take, if there are enough
   std::optional<std::int64_t> cap;               // the largest number of pictures of one species in one split

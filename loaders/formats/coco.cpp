@@ -129,7 +129,7 @@ void read_image(CocoFile& file, std::size_t index, Loading& loading, RecordReade
   sample.source = image.optional_text("source_dataset");
 }
 
-// Whether `bbox` says anything. Tools write zeros, null or an empty list where nobody drew a box.
+// Returns whether `bbox` says anything. Tools write zeros, null or an empty list where nobody drew a box.
 bool has_box(const json& annotation) {
   const auto box = annotation.is_object() ? annotation.find("bbox") : annotation.end();
   if (box == annotation.end() || box->is_null()) return false;

@@ -44,7 +44,7 @@ keypoints::NameMatch match_in_order(const keypoints::Topology& topology) {
   return match;
 }
 
-// Whether the file lists the topology's keypoints in the topology's order.
+// Returns whether the file lists the topology's keypoints in the topology's order.
 bool are_in_order(const keypoints::NameMatch& match) {
   std::vector<int> present;
   std::copy_if(match.places.begin(), match.places.end(), std::back_inserter(present),

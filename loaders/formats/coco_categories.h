@@ -30,8 +30,9 @@ class CocoCategories {
   // keypoints of the file, or null if there are several.
   const CocoCategory* of(const nlohmann::json& annotation);
 
-  // Whether the annotation is left out: its category is not chosen, or it is a rectangle or an outline
-  // without keypoints of a category that lists none, while others do (as Label Studio and CVAT write them).
+  // Returns whether the annotation is left out. That is so if its category is not chosen. It is also so for a
+  // rectangle or an outline without keypoints whose category lists none while other categories do; Label
+  // Studio and CVAT write these.
   bool leaves_out(const nlohmann::json& annotation);
 
   // Appends how many annotations were left out.

@@ -36,7 +36,7 @@ class CocoIdMap {
   const Value* find(const CocoId& id);
 
   std::size_t size() const { return values_.size(); }
-  // How many values were found although the id was of the other type.
+  // The number of values that were found although the id was of the other type.
   std::size_t found_as_other_type() const { return found_as_other_type_; }
   // An id of the map, for messages; empty if there is none.
   const std::string& example() const { return example_; }

@@ -1,4 +1,4 @@
-// What a label file says about its keypoints, before there is a topology to load it with.
+// A survey tells what a label file says about its keypoints, before there is a topology to load it with.
 #pragma once
 
 #include <filesystem>

@@ -93,7 +93,7 @@ bool is_megadetector(const json& document) {
          images->front().contains("detections");
 }
 
-// Whether a detection is of an animal. MegaDetector also finds people and vehicles.
+// Returns whether a detection is of an animal. MegaDetector also finds people and vehicles.
 bool is_animal(const json& document, const json& detection) {
   const auto names = document.find("detection_categories");
   const auto category = detection.find("category");

@@ -26,7 +26,7 @@ struct NameReading {
 // Readings that equal an earlier one are left out.
 std::vector<NameReading> readings_of(std::string_view name);
 
-// Whether a normalised relative path leaves its folder.
+// Returns whether a normalised relative path leaves its folder.
 bool climbs_out(const std::filesystem::path& normal);
 
 // Returns the name as it appears in a sample id: relative to the root, without "." and "..", on one line. If

@@ -63,7 +63,7 @@ class RecordReader {
 // A labelled keypoint must lie within this many pixels of the origin. A larger number is not a coordinate.
 inline constexpr double kMaxCoordinatePx = 1e6;
 
-// Whether tools put a point that nobody set at this place: (0, 0) or (-1, -1).
+// Returns whether this is a place where tools put a point that nobody set: (0, 0) or (-1, -1).
 bool is_placeholder(double x_px, double y_px);
 
 // Makes a keypoint of x, y, v. A placeholder has weight 0, whatever its v. Returns false if the keypoint is

@@ -6,7 +6,7 @@
 
 namespace q3d::loaders::formats {
 
-// Whether `bbox` holds a list of boxes instead of one.
+// Returns whether `bbox` holds a list of boxes instead of one.
 bool holds_several_animals(const nlohmann::json& record);
 
 // Splits a record whose `bbox` holds a box for each animal into a record an animal. `keypoint_2d` must hold a

@@ -1,4 +1,4 @@
-// What the name of a keypoint says: the side, the end of the body, and the part.
+// The name of a keypoint is read as words: the side, the end of the body, and the part.
 #pragma once
 
 #include <cstdint>

@@ -158,7 +158,7 @@ class Reader {
     }
   }
 
-  // Whether the mirror image of a keypoint is mapped although it is another keypoint.
+  // Returns whether the mirror image of a keypoint is mapped although it is another keypoint.
   bool is_mapped_to_another(int keypoint, int partner) const {
     const auto& source = topology_.source;
     return partner != keypoint && std::find(source.begin(), source.end(), partner) != source.end();

@@ -5,7 +5,7 @@
 
 namespace q3d::loaders::pictures {
 
-// Whether the orientation (EXIF's, 1 to 8) exchanges width and height.
+// Returns whether the orientation (EXIF's, 1 to 8) exchanges width and height.
 bool exchanges_sides(int orientation);
 
 // Returns the picture as a viewer shows it: 2 and 4 are mirrored, 3 is upside down, 5 to 8 lie on a side (5

@@ -1,4 +1,4 @@
-// What a picture's header says of it, read without decoding the pixels.
+// Reads what a picture's header says of it, without decoding the pixels.
 #pragma once
 
 #include <cstddef>

@@ -36,8 +36,8 @@ std::string species_of_picture(std::string_view file_name, std::string_view sour
 // annotation file states always wins.
 std::optional<manifests::Family> family_of_species(std::string_view species);
 
-// How Animal Kingdom classifies an animal. Its mammal split contains birds, primates, kangaroos and other
-// animals that the body of a quadruped cannot represent.
+// This is how Animal Kingdom classifies an animal. Its mammal split contains birds, primates, kangaroos and
+// other animals that the body of a quadruped cannot represent.
 struct AnimalClass {
   std::string parent_class;  // "Mammal"
   std::string animal_class;

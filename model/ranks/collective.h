@@ -1,8 +1,8 @@
-// What training needs of the other ranks: the processes that each train on a part of the same batch.
+// Connects a rank with the others. Ranks are processes that each train on a part of the same batch.
 //
-// With W ranks every rank computes a loss and named numbers of its own part, made such that their mean over
-// the ranks is the joint batch's. Gradients and numbers are then averaged, so that all ranks move their
-// weights alike and need never exchange them.
+// With W ranks, every rank computes a loss and named numbers of its own part. They are made such that their
+// mean over the ranks is that of the joint batch. Gradients and numbers are then averaged, so that all ranks
+// move their weights alike and need never exchange them.
 #pragma once
 
 #include <torch/types.h>

@@ -1,4 +1,4 @@
-// Which rank this process is, as its launcher says in the environment.
+// Reads from the environment which rank the launcher has made of this process.
 #pragma once
 
 #include <chrono>

@@ -1,4 +1,4 @@
-// How the losses are weighed, and which form of them is used.
+// The weights of the losses, and the form of them that is used.
 #pragma once
 
 #include <cstdint>

@@ -70,8 +70,8 @@ void place_tube(const QuadrupedMesh& mesh, const Tube& tube, const Anatomy& anat
   points.row(mesh.pole_of(tube.part)) = profile.pole;
 }
 
-// How far the seams reach, in edges. Small tubes start part of the way: their own shape is not to be rounded
-// off.
+// The reach of the seams, in edges. The seams of small tubes start part of the way, so that the tubes keep
+// their shape.
 constexpr int kSeamReach = 4;
 int first_step(Part part) {
   return part == Part::right_foreleg || part == Part::right_hindleg ? 0 : 2;

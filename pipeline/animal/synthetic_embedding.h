@@ -1,4 +1,4 @@
-// Where the vertices of the synthetic quadruped lie for an animal of given measures.
+// Places the vertices of the synthetic quadruped for an animal of given measures.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,4 +1,4 @@
-// How the synthetic quadruped moves: a linear model of its joint angles.
+// The synthetic quadruped moves by a linear model of its joint angles.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,4 +1,4 @@
-// What poses and shapes the synthetic quadruped takes: priors in the official layout, and samples from them.
+// The priors of the synthetic quadruped's poses and shapes, in the official layout, and samples from them.
 #pragma once
 
 #include <torch/types.h>

@@ -27,7 +27,7 @@ void add_chain(Part part, double ring, double share, Eigen::MatrixXd& weights, E
   }
 }
 
-// How a tube's joints pull at the body around its hole.
+// Says how a tube's joints pull at the body around its hole.
 struct Root {
   Part part;
   int solid_ring;  // from here on the tube moves with its own joints alone

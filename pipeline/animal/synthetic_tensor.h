@@ -1,4 +1,4 @@
-// From Eigen to LibTorch.
+// Converts matrices of Eigen to tensors.
 #pragma once
 
 #include <torch/types.h>

@@ -44,7 +44,8 @@ class UnitBuilder {
         judgements_(workspace.ingest().candidates.size()),
         progress_("candidates", static_cast<std::int64_t>(workspace.ingest().candidates.size()),
                   workspace.quiet()) {
-    // By the labels' digest: what a veto leaves out is not measured. Without pseudo labels there is no key.
+    // Measurements go by the labels' digest, because a vetoed candidate is not measured. Without pseudo
+    // labels there is no key.
     if (!keys.measure.empty()) {
       measurements_.emplace(workspace.out(), "measure", keys.measure, &candidates::Unit::label_digest);
     }

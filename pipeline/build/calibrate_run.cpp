@@ -42,8 +42,8 @@ struct Scored {
   filters::ScoredSample score;
 };
 
-// Of every candidate with pseudo labels and a prediction that is not excluded, in ingest order. What an
-// earlier run predicted is not predicted again.
+// Returns the scores of every candidate that is not excluded, has the role `pseudo` and has a prediction, in
+// ingest order. Predictions of an earlier run are used again.
 std::vector<Scored> predict_pool(const config::BuildConfig& config, Workspace& workspace) {
   const candidates::Ingest& ingest = workspace.ingest();
   stages::StageStore predictions(workspace.out(), "predict",
@@ -198,8 +198,8 @@ filters::CalibratedPool calibrate_pool(const std::string& dataset, const std::ve
   return result;
 }
 
-// What can be said of the pool before any label is made. One threshold of all datasets is told for each of
-// them.
+// Returns the warnings that can be given of the pool before any label is made. A threshold that all datasets
+// share is reported for each of them.
 std::vector<dataset::Warning> warnings_of(const std::vector<Scored>& scored,
                                           const std::vector<filters::CalibratedPool>& calibrated,
                                           const config::BuildConfig& config, const Workspace& workspace) {

@@ -1,4 +1,4 @@
-// From finished units to an immutable version folder.
+// Makes an immutable version folder from finished units.
 #pragma once
 
 #include <filesystem>

@@ -10,7 +10,7 @@ namespace {
 using dataset::Warning;
 using dataset::WarningKind;
 
-// What a person who has photographs can do.
+// The advice for a person who has photographs.
 constexpr const char* kForPhotographs =
     "For photographs import the official weights and SMAL (docs/assets.md), or train a network on "
     "photographs";

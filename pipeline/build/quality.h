@@ -1,5 +1,5 @@
-// Whether labels are good in absolute terms. The shares of a calibration cannot say so: they are met on any
-// pictures.
+// Judges whether labels are good in absolute terms. The shares of a calibration cannot say so, because they
+// are met on any pictures.
 #pragma once
 
 #include <filesystem>
@@ -21,7 +21,7 @@ struct PoolErrors {
   double tau_high = 0.0;       // crop units
 };
 
-// What the files of network and body say of themselves.
+// The origins that the files of network and body state.
 struct Origins {
   device::NetworkDomain domain;
   bool has_rendered_body = false;

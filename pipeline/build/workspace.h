@@ -1,4 +1,5 @@
-// What every run over an output folder begins with: the lock, the candidates, the assets and the network.
+// Every run over an output folder begins with a workspace: the lock, the candidates, the assets and the
+// network.
 #pragma once
 
 #include <tbb/global_control.h>
@@ -30,7 +31,7 @@ class Workspace {
   const std::filesystem::path& out() const { return options_.out; }
   const candidates::Ingest& ingest() const { return ingest_; }
   const stages::AssetDigests& assets() const { return assets_; }
-  // What network and body say of themselves; nothing when no dataset needs the network.
+  // The origins that network and body state; empty when no dataset needs the network.
   const Origins& origins() const { return origins_; }
   // Empty, like the digests of assets(), when no dataset needs the network.
   const std::string& device_key() const { return device_key_; }

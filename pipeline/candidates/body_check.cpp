@@ -27,7 +27,7 @@ struct Difference {
   std::size_t keypoint = 0;
 };
 
-// Of the keypoint that lies furthest off.
+// Returns the difference of the keypoint that lies furthest off.
 Difference largest_difference(const Keypoints3d& file, const Keypoints3d& body) {
   const std::array<double, 3> file_centre = centroid(file);
   const std::array<double, 3> body_centre = centroid(body);

@@ -1,5 +1,5 @@
-// What a file says of its bodies twice, compared: its 3D keypoints against those of the body that its pose
-// and shape make.
+// Some files state a body twice. This compares their 3D keypoints with those of the body that their pose and
+// shape make.
 #pragma once
 
 #include <cstddef>

@@ -6,10 +6,11 @@
 
 namespace q3d::pipeline::candidates {
 
-// Without `curation`: loaders::load_dataset. With it: the records whose picture the list chose for this
-// split, in file order; a species that the record lacks comes from the list, and the family from it; the list
-// is one of the dataset's files. Throws ConfigError for options that make no sense and a list that is none,
-// of another split, or of other annotation files; std::runtime_error as loaders::load_dataset does.
+// Without `curation`, this is loaders::load_dataset. With it, the records are those whose picture the list
+// chose for this split, in file order. A species that the record lacks comes from the list, and the family
+// follows from it. The list is one of the dataset's files. Throws ConfigError for options that make no sense,
+// and for a list that is malformed, of another split, or of other annotation files. Throws std::runtime_error
+// as loaders::load_dataset does.
 loaders::formats::Dataset load_configured(const config::DatasetConfig& options);
 
 }  // namespace q3d::pipeline::candidates

@@ -83,7 +83,8 @@ void digest_pictures(std::vector<Candidate>& candidates, manifests::DigestCache&
   run::throw_if_interrupted();
 }
 
-// What the config says of the terms of its datasets, as text, by dataset_key; nothing where it says nothing.
+// Returns the terms of the datasets as the config states them, as text, by dataset_key. A dataset without
+// terms is left out.
 std::map<std::string, std::string> texts_of_terms(const config::BuildConfig& config) {
   std::map<std::string, std::string> texts;
   for (const config::DatasetConfig& dataset : config.datasets) {

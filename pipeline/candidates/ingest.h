@@ -19,7 +19,7 @@
 
 namespace q3d::pipeline::candidates {
 
-// Why a candidate is left out whatever its prediction.
+// The reason why a candidate is left out, whatever its prediction.
 struct Exclusion {
   manifests::Reason reason = manifests::Reason::none;
   std::string detail;  // for people
@@ -45,7 +45,7 @@ struct Unit {
   std::string label_digest;
 };
 
-// What came of comparing the pool with the test sets.
+// The result of comparing the pool with the test sets.
 struct LeakageSummary {
   std::map<std::string, std::string> test_sets;  // "name/split" -> SHA-256 of its annotation files
   std::size_t test_pictures = 0;
@@ -54,7 +54,7 @@ struct LeakageSummary {
   std::size_t in_groups = 0;  // pictures
 };
 
-// What a person should know of a dataset, or of the whole pool.
+// A remark that a person should know about a dataset, or about the whole pool.
 struct IngestNote {
   loaders::formats::NoteKind kind = loaders::formats::NoteKind::remark;
   std::string dataset;  // "name/split"; empty where it concerns the pool
@@ -85,8 +85,8 @@ struct Ingest {
 Ingest ingest(const config::BuildConfig& config, manifests::DigestCache& digests,
               const device::BodyMeshesLoader& load_bodies);
 
-// Whether the dataset in this folder is part of a world that `sample` rendered: the folder or the one above
-// it holds the world's world.json. Pictures without this mark count as photographs.
+// Returns whether the dataset in this folder is part of a world that `sample` rendered. If so, the folder or
+// the one above it holds the world's world.json. Pictures without this mark count as photographs.
 bool is_rendered(const std::filesystem::path& root);
 
 // Returns a dataset's name and split as one word, "name/split": the key of whatever is listed by dataset.

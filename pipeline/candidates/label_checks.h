@@ -19,7 +19,7 @@ struct LabelProblem {
 std::optional<LabelProblem> find_label_problem(const manifests::SampleRecord& record, int width_px,
                                                int height_px);
 
-// How many visible keypoints lie outside the picture, by more than two pixels.
+// Returns how many visible keypoints lie outside the picture by more than two pixels.
 int keypoints_outside(const manifests::SampleRecord& record, int width_px, int height_px);
 
 }  // namespace q3d::pipeline::candidates

@@ -33,7 +33,7 @@ struct Size {
   std::string text() const { return fmt::format("{} x {}", width_px, height_px); }
 };
 
-// Whether a stated size, of which a side may be unknown (0), is this one.
+// Returns whether a stated size, of which a side may be unknown (0), agrees with this one.
 bool agrees(const Size& stated, const Size& size) {
   return (stated.width_px == 0 || stated.width_px == size.width_px) &&
          (stated.height_px == 0 || stated.height_px == size.height_px);

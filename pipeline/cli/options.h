@@ -12,7 +12,7 @@
 
 namespace q3d::pipeline::cli {
 
-// What a command line says of a config.
+// The arguments of a command line that make up a config.
 struct ConfigArguments {
   std::vector<std::filesystem::path> files;
   std::vector<std::string> set;  // KEY=VALUE of each --set

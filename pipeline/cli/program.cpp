@@ -27,7 +27,7 @@ constexpr int kFailure = 1;
 constexpr int kUsage = 2;
 constexpr int kInterrupted = 130;
 
-// What a person can do about an errno.
+// Returns what a person can do about an errno.
 const char* advice(int code) {
   switch (code) {
     case EACCES:

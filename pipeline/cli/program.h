@@ -1,4 +1,4 @@
-// What the two programs share: the command line, the commands' names, exit codes.
+// The two programs share this: the command line, the commands' names and the exit codes.
 #pragma once
 
 #include <span>

@@ -6,7 +6,7 @@
 
 namespace q3d::pipeline::cli {
 
-// Whether this interpreter can import the module, and what it said if not.
+// Says whether this interpreter can import the module, and what it printed if not.
 struct PythonCheck {
   bool has_module = false;
   std::string message;

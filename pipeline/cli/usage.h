@@ -1,4 +1,4 @@
-// What is said about a command line that cannot be used.
+// The messages about a command line that cannot be used.
 #pragma once
 
 #include <CLI/App.hpp>

@@ -24,7 +24,7 @@ void require(bool holds, const std::string& where, const std::string& what) {
   if (!holds) throw run::ConfigError(where + ": " + what);
 }
 
-// What may become a file's name.
+// Returns whether the text may become a file's name.
 bool is_plain_name(std::string_view text) {
   return !text.empty() && std::all_of(text.begin(), text.end(), [](unsigned char c) {
     return std::isalnum(c) != 0 || c == '_' || c == '.' || c == '-';

@@ -1,4 +1,4 @@
-// What every configuration of this program shares: JSON files laid over each other, and words from a list.
+// Every configuration of this program shares this: JSON files laid over each other, and words from a list.
 #pragma once
 
 #include <nlohmann/json.hpp>

@@ -1,4 +1,4 @@
-// How deep the objects and lists of a config may lie within each other.
+// Limits how deep the objects and lists of a config may lie within each other.
 #pragma once
 
 #include <fmt/format.h>

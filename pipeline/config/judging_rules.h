@@ -1,4 +1,4 @@
-// What a build judges by: the thresholds of each dataset and the guards.
+// A build judges by these rules: the thresholds of each dataset and the guards.
 #pragma once
 
 #include <map>

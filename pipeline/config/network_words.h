@@ -1,4 +1,4 @@
-// What the config says of the network and of adaptation in words.
+// The settings of the network and of adaptation that are words.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@ std::string_view to_string(Dtype dtype);
 Dtype dtype_from_string(std::string_view name);   // throws std::invalid_argument on an unknown name
 std::span<const std::string_view> dtype_names();  // in the order of the enumerators
 
-// What adaptation minimises (model/tta.h).
+// The objective that adaptation minimises (model/tta.h).
 enum class TtaObjective : std::uint8_t { paper, demo };
 std::string_view to_string(TtaObjective objective);
 TtaObjective tta_objective_from_string(std::string_view name);  // throws std::invalid_argument

@@ -1,4 +1,4 @@
-// What a build makes of a dataset: where the labels of its samples come from.
+// A dataset's role says where the labels of its samples come from.
 #pragma once
 
 #include <string>
@@ -17,7 +17,7 @@ std::string_view to_string(Role role);         // pseudo, truth, 2d_only
 std::vector<std::string> role_names();         // in the order of the enumerators
 Role role_from_string(std::string_view name);  // throws std::invalid_argument on an unknown name
 
-// What the label of a kept candidate is.
+// Returns the kind of label that a kept candidate gets.
 manifests::LabelKind label_kind(Role role, manifests::Verdict verdict);
 
 }  // namespace q3d::pipeline::config

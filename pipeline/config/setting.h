@@ -58,7 +58,7 @@ struct Setting {
 template <typename Struct>
 using Settings = std::vector<Setting<Struct>>;
 
-// What the schema and the page say of a setting, without its struct.
+// The facts about a setting that the schema and the page show; they do not depend on the setting's struct.
 struct SettingFacts {
   std::string key;
   std::string type;              // of JSON Schema: boolean, integer, number, string, array (of strings)

@@ -20,7 +20,7 @@ SettingsTables build_settings_tables();
 // `tables` does not know, for a table without its end, and for a name that the page lacks.
 std::string with_settings_tables(const std::string& page, const SettingsTables& tables);
 
-// Whether the page has a table of one of these names.
+// Returns whether the page has a table of one of these names.
 bool has_settings_table(const std::string& page, const SettingsTables& tables);
 
 }  // namespace q3d::pipeline::config

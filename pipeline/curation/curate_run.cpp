@@ -25,7 +25,7 @@ using loaders::curation::Curated;
 using loaders::curation::CuratedPicture;
 using nlohmann::ordered_json;
 
-// What is known of pictures besides their names, by normalised sub-dataset.
+// The labels that are known for pictures besides their names, by normalised sub-dataset.
 using LabelsOfSource = std::map<std::string, loaders::curation::SourceLabels>;
 
 struct Inputs {

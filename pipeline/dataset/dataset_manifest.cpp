@@ -155,7 +155,7 @@ ordered_json text_or_null(const std::string& text) {
   return text.empty() ? ordered_json(nullptr) : ordered_json(text);
 }
 
-// Where the samples come from, and under which terms.
+// Describes where the samples come from, and under which terms.
 ordered_json describe_datasets(const config::BuildConfig& config) {
   const auto terms = terms_of_datasets(config);
   ordered_json datasets = ordered_json::object();

@@ -50,7 +50,7 @@ struct GroupStatistics {
   std::optional<double> mean_final_error;
 };
 
-// What a reader needs of dataset.json.
+// The content of dataset.json that readers need.
 struct DatasetManifest {
   std::string name;
   std::string version;
@@ -79,7 +79,7 @@ struct DatasetManifest {
   std::vector<Warning> warnings;  // why the labels may be worth little
 };
 
-// What the config says of its datasets' terms, by "name/split".
+// Returns the terms that the config states for its datasets, by "name/split".
 std::map<std::string, manifests::DatasetTerms> terms_of_datasets(const config::BuildConfig& config);
 
 // SHA-256 over the shards' digests, one a line, in unit order.

@@ -20,7 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
-// What is known of the candidate besides its row of verdicts.csv.
+// All that is known of the candidate besides its row of verdicts.csv.
 struct Evidence {
   manifests::SampleRecord record;  // id, image_ref, box and keypoints
   std::optional<smal::CropPoints> before;
@@ -34,7 +34,7 @@ ordered_json number_or_null(double value) {
   return std::isfinite(value) ? ordered_json(value) : ordered_json(nullptr);
 }
 
-// What the stages' tables hold of the candidate. Leaves the evidence without an id if they do not hold it.
+// Reads the candidate's rows in the stages' tables. Leaves the evidence without an id if there are none.
 void read_stages(const PublishedDataset& dataset, const VerdictRow& row, Evidence& evidence) {
   const std::int64_t unit = dataset.unit_of(row);
   const std::size_t place = dataset.place_in_unit(row);

@@ -15,7 +15,7 @@
 
 namespace q3d::pipeline::dataset {
 
-// What predict was asked and gave, of one unit.
+// The candidates of one unit and their predictions.
 struct UnitPredictions {
   std::vector<manifests::SampleRecord> candidates;  // id, image_ref, box and keypoints; nothing else is set
   std::vector<unit::PredictedSample> samples;       // of the same candidates, in the same order

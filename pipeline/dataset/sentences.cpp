@@ -17,7 +17,7 @@ using manifests::LabelKind;
 using manifests::Reason;
 using manifests::Verdict;
 
-// For a value that is no enumerator at all.
+// Reports a value that is no enumerator at all.
 [[noreturn]] void no_enumerator(const char* type, int value) {
   throw std::logic_error(fmt::format("{}: got {}, which is no enumerator", type, value));
 }

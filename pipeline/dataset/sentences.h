@@ -17,16 +17,16 @@ std::string_view sentence(manifests::Verdict verdict);
 std::string_view sentence(manifests::Reason reason);
 std::string_view sentence(manifests::LabelKind kind);
 
-// What decided about a candidate, in its own numbers. A candidate with a reason is always explained by its
-// reason. `thresholds` are those of its dataset; they are needed where the fidelity rule decided. Throws
-// std::runtime_error if they are missing there.
+// Returns a sentence that says what decided about a candidate, in its own numbers. A candidate with a reason
+// is always explained by its reason. `thresholds` are those of its dataset; they are needed where the
+// fidelity rule decided. Throws std::runtime_error if they are missing there.
 std::string why(const manifests::Judgement& judgement, config::Role role,
                 const std::optional<filters::Thresholds>& thresholds);
 
 struct DatasetManifest;
 
-// How good the labels are, in words: how far they lie from the annotated keypoints, on the scale of the crop,
-// and what this does not say.
+// Returns a text that says how good the labels are: how far they lie from the annotated keypoints, on the
+// scale of the crop, and what this does not prove.
 std::string quality_sentence(const DatasetManifest& manifest);
 
 }  // namespace q3d::pipeline::dataset

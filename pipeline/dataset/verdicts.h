@@ -30,7 +30,7 @@ struct VerdictRow {
   std::optional<LabelPlace> label;  // of the kept ones
   std::string image_sha256;
 
-  // Whether the fidelity rule saw a prediction of it: initial_error is a number.
+  // Returns whether the fidelity rule saw a prediction of the candidate, so that initial_error is a number.
   bool is_judged() const;
 };
 

@@ -1,4 +1,5 @@
-// Why the labels of a dataset may be worth little. dataset.json lists them, `build` says them aloud.
+// Warnings say why the labels of a dataset may be worth little. dataset.json lists them and `build` prints
+// them.
 #pragma once
 
 #include <nlohmann/json.hpp>

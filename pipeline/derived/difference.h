@@ -14,7 +14,7 @@
 
 namespace q3d::pipeline::derived {
 
-// How far the label of a candidate moved that both versions keep.
+// Says how far a label moved whose candidate both versions keep.
 struct LabelChange {
   std::string id;
   double error_before = 0.0;  // L_proj in crop units; NaN where it was not computed
@@ -31,7 +31,7 @@ struct VersionDifference {
   std::int64_t in_both = 0;
   std::vector<std::string> only_before;  // ids of candidates
   std::vector<std::string> only_after;
-  // Of the candidates in both: those whose verdict differs, by (before, after).
+  // Holds the candidates of both versions whose verdict differs, by (before, after).
   std::map<std::pair<manifests::Verdict, manifests::Verdict>, std::vector<std::string>> verdicts;
   std::int64_t equal_labels = 0;    // kept in both, every number of the label equal
   std::vector<LabelChange> labels;  // kept in both with another label, the largest change of keypoints first

@@ -10,7 +10,7 @@
 
 namespace q3d::pipeline::derived {
 
-// What a condition may ask of a candidate: its row of verdicts.csv, and the kind of its label.
+// A condition may ask for these facts of a candidate: its row of verdicts.csv, and the kind of its label.
 struct WhereRow {
   const dataset::VerdictRow& verdict;
   std::optional<manifests::LabelKind> label_kind;  // nothing unless it is kept

@@ -1,5 +1,5 @@
-// What a checkpoint says of the pictures that its network knows. It stands in the file's metadata under
-// kDomainKey: `train` measures and writes it, tools/import_assets.py writes what the paper states.
+// The domain of a checkpoint describes the pictures that its network knows. It stands in the file's metadata
+// under kDomainKey. `train` measures and writes it; tools/import_assets.py writes what the paper states.
 #pragma once
 
 #include <cstdint>

@@ -17,7 +17,7 @@ namespace q3d::pipeline::device {
 struct BodyPrediction : smal::Body {
   smal::Keypoints3d keypoints_3d{};
   smal::CropPoints keypoints_2d{};
-  // Of the decoder's keypoint tokens; the 3D ones are not centred.
+  // These come from the decoder's keypoint tokens. The 3D ones are not centred.
   smal::CropPoints aux_keypoints_2d{};
   smal::Keypoints3d aux_keypoints_3d{};
 };

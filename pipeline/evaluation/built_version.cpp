@@ -41,8 +41,8 @@ json built_digest(const json& provenance, const char* list) {
   return built.is_null() ? built : built.at("sha256");
 }
 
-// Whether dataset.json tells of a build with this config. `veto` and `corrections` are the digests of the
-// config's lists.
+// Returns whether dataset.json describes a build with this config. `veto` and `corrections` are the digests
+// of the config's lists.
 bool is_of(const json& document, const config::BuildConfig& config, const stages::StageKeys& keys,
            const json& veto, const json& corrections) {
   const json& provenance = document.at("provenance");

@@ -1,4 +1,4 @@
-// Which finished dataset of an output folder a config has built, found without its candidates.
+// Finds the finished dataset of an output folder that a config has built, without reading its candidates.
 #pragma once
 
 #include <filesystem>

@@ -10,7 +10,7 @@
 
 namespace q3d::pipeline::evaluation {
 
-// What measuring needs and does not change.
+// The inputs that measuring needs and does not change.
 struct Instruments {
   const Plan* plan = nullptr;
   const device::BodyMeshes* meshes = nullptr;

@@ -1,5 +1,5 @@
-// What the comparison of two networks and that of two sets of labels have in common: a difference with its
-// bootstrap interval, in words, in JSON and in a table.
+// The comparison of two networks and that of two sets of labels share this: a difference with its bootstrap
+// interval, in words, in JSON and in a table.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -25,7 +25,7 @@ void require_pairs(std::size_t before, std::size_t after, std::string_view what)
 // The picture of a sample: its id, dataset/split/picture#annotation, without the annotation.
 std::string picture_of(const std::string& sample_id);
 
-// What every row of a comparison holds.
+// The values that every row of a comparison holds.
 struct ComparedMeans {
   Metric metric = Metric::auc;
   double before = 0.0;

@@ -1,4 +1,4 @@
-// What `evaluate` wrote, read back: the values of every sample, for comparisons.
+// Reads back what `evaluate` wrote: the values of every sample, for comparisons.
 #pragma once
 
 #include <filesystem>

@@ -1,5 +1,6 @@
-// What is true of pictures whose annotation file says less: read for evaluation alone, never for training.
-// docs/synthetic-world.md describes the file, which the synthetic world writes beside its 2D-only sets.
+// The hidden truth is all that is true of pictures whose annotation file says less. It is read for evaluation
+// alone, never for training. docs/synthetic-world.md describes the file, which the synthetic world writes
+// beside its 2D-only sets.
 #pragma once
 
 #include <cstddef>

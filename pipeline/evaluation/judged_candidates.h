@@ -1,4 +1,4 @@
-// What a build made of its candidates, read back from its output folder: verdicts as published, the network's
+// Reads back from an output folder what a build made of its candidates: verdicts as published, the network's
 // predictions and the refined bodies. Neither annotation files nor pictures are read.
 #pragma once
 

@@ -1,4 +1,4 @@
-// What `evaluate-labels --report` wrote, read back.
+// Reads back what `evaluate-labels --report` wrote.
 #pragma once
 
 #include <filesystem>

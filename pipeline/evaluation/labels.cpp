@@ -33,7 +33,7 @@ struct Truths {
   std::vector<std::optional<manifests::Keypoints>> keypoints;
 };
 
-// Whether something is to be measured that only the annotation files know.
+// Returns whether something is to be measured that only the annotation files know.
 bool needs_annotations(const JudgedPool& pool, const Truths& truths) {
   for (std::size_t i = 0; i < truths.records.size(); ++i) {
     const manifests::SampleRecord& record = truths.records[i];

@@ -25,11 +25,11 @@ struct MetricInfo {
   bool higher_is_better;
   bool needs_body;  // 3D truth; the others need a visible keypoint
 };
-// In the order of the enumerators.
+// The entries are in the order of the enumerators.
 extern const std::array<MetricInfo, kMetricCount> kMetrics;
 
-// By Metric; nothing where the sample lacks what the metric needs. auc, pck_*: percent; l_proj: crop units;
-// pa_*: mm where the body's unit is the metre.
+// The values of a sample, by Metric. A value is missing where the sample lacks what the metric needs. Units
+// are percent for auc and pck_*, crop units for l_proj, mm for pa_* where the body's unit is the metre.
 using MetricValues = std::array<std::optional<double>, kMetricCount>;
 inline std::size_t index_of(Metric metric) {
   return static_cast<std::size_t>(metric);
@@ -39,11 +39,11 @@ struct MetricMean {
   std::optional<double> mean;
   std::int64_t samples = 0;  // behind the mean
 };
-// Of one metric over samples; a sample without a value is left out, or counts as 0.
+// Returns the mean of one metric. A sample without a value is left out, or is 0 with `missing_is_zero`.
 MetricMean mean_of(std::span<const MetricValues* const> samples, std::size_t metric,
                    bool missing_is_zero = false);
 
-// What a prediction is measured against.
+// The truth that a prediction is measured against.
 struct Target {
   device::CropKeypoints keypoints{};         // annotated
   double normaliser_px = smal::kCropSidePx;  // sqrt(mask area) of the 256-px crop, or 256 for the whole crop

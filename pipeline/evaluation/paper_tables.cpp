@@ -18,7 +18,7 @@ struct PaperRow {
   Numbers numbers;
 };
 
-// What a column shows: a metric of a dataset, or of one of its families.
+// A column shows a metric of a dataset, or of one of its families.
 struct Column {
   const char* title;
   const char* dataset;

@@ -1,4 +1,4 @@
-// What `evaluate` leaves behind: evaluation.json, samples.csv and tables.csv, and a summary for people.
+// Writes the results of `evaluate`: evaluation.json, samples.csv and tables.csv, and a summary for people.
 #pragma once
 
 #include <nlohmann/json.hpp>

@@ -13,7 +13,8 @@ namespace q3d::pipeline::evaluation {
 std::string number_text(const std::optional<double>& value);
 nlohmann::ordered_json number_or_null(const std::optional<double>& value);
 
-// What AUC and PCK of `samples` were divided by: "mask", "crop", "mask and crop"; "" without samples.
+// Returns what AUC and PCK of `samples` were divided by: "mask", "crop", "mask and crop", or "" without
+// samples.
 std::string normaliser_name(std::int64_t by_mask, std::int64_t samples);
 
 }  // namespace q3d::pipeline::evaluation

@@ -66,7 +66,7 @@ class CocoWriter final : public FormatWriter {
   std::vector<std::string> picture_patterns() const override { return {"images/*." + dataset_.suffix}; }
 
  private:
-  // Without a picture of its own, the sample's source picture.
+  // Returns the name of the exported picture, or that of the source picture if none was exported.
   std::string file_name(const ExportedSample& exported) const {
     if (exported.picture.bytes.empty()) return exported.sample.record.image_ref;
     return picture_stem(exported.sample, exported.unit, exported.row) + "." + dataset_.suffix;

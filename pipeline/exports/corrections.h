@@ -1,4 +1,4 @@
-// What a person changed in an exported COCO file, for the next build.
+// Collects what a person changed in an exported COCO file, for the next build.
 #pragma once
 
 #include <cstddef>

@@ -171,7 +171,7 @@ class Exporter {
         sample.record.id, square.center_x_px, square.center_y_px, square.side_px, centre.x, centre.y, side));
   }
 
-  // Of all samples: how many have a picture, and which datasets lack a licence.
+  // Says how many of all samples have a picture, and which datasets lack a licence.
   ordered_json summary_json() const {
     std::int64_t pictures = 0;
     std::set<std::string> without;

@@ -1,4 +1,5 @@
-// What differs between the formats of an export: names of pictures, records, and the files made of them.
+// A format of an export differs from others in the names of pictures, the records, and the files made of
+// them.
 #pragma once
 
 #include <cstdint>
@@ -32,7 +33,7 @@ struct PictureFile {
 class FormatWriter {
  public:
   virtual ~FormatWriter() = default;
-  // Which kind of picture the format needs, where pictures may be exported.
+  // Returns the kind of picture that the format needs, where pictures may be exported.
   virtual Pictures pictures() const = 0;
   // The files of the sample's picture; none where it has none.
   virtual std::vector<PictureFile> picture_files(const ExportedSample& exported) const = 0;
@@ -45,14 +46,14 @@ class FormatWriter {
   virtual std::vector<std::string> picture_patterns() const = 0;
 };
 
-// What a writer knows of the whole dataset before it sees the samples.
+// The facts about the whole dataset that a writer knows before it sees the samples.
 struct ExportedDataset {
   std::string title;       // "name version (folder)"
   std::string content_id;  // of the dataset
   std::string suffix;      // of the pictures: "jpg" or "png"
   std::size_t unit_size = 0;
-  // Of the samples' species, sorted by name, with the family of its first sample. The empty name stands for
-  // an unknown species.
+  // The species of the samples, sorted by name. Each has the family of its first sample. The empty name
+  // stands for an unknown species.
   std::vector<std::pair<std::string, manifests::Family>> species;
 };
 

@@ -18,7 +18,7 @@ namespace pictures = loaders::pictures;
 constexpr int kJpegQuality = 95;
 constexpr double kNearlyWhole = 1e-9;  // px
 
-// What to add to the crop's pixels so that the centre of the network's crop lies on whole pixels.
+// Returns what to add to the crop's pixels so that the centre of the network's crop lies on whole pixels.
 pictures::Point shift_to_whole(const manifests::ShardSample& sample) {
   const pictures::Point centre =
       pictures::map_point(sample.crop_from_image, {sample.patch_box[0], sample.patch_box[1]});

@@ -11,7 +11,7 @@
 
 namespace q3d::pipeline::exports {
 
-// What an export needs of a sample's picture.
+// The kind of picture that an export needs of a sample.
 enum class Pictures {
   as_stored,  // the bytes of the shard's crop, unchanged
   official,   // a crop in which the official code finds the network's crop again: it floors the box's centre

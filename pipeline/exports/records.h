@@ -11,8 +11,8 @@
 
 namespace q3d::pipeline::exports {
 
-// Where the pictures of a sample lie, relative to the folder that the reader joins them to. Empty without
-// one.
+// The paths of a sample's pictures, relative to the folder that the reader joins them to. A path is empty if
+// there is no picture.
 struct PictureNames {
   std::string image;
   std::string mask;

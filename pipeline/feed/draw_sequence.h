@@ -1,5 +1,5 @@
-// Which sample is drawn when: weighted sampling with replacement over pools, as a function of the position
-// alone.
+// Decides which sample is drawn when. This is weighted sampling with replacement over pools, as a function of
+// the position alone.
 #pragma once
 
 #include <cstdint>

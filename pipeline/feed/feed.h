@@ -1,4 +1,4 @@
-// From shards to training batches: draw, decode, augment, normalise.
+// Makes training batches from shards: draw, decode, augment, normalise.
 #pragma once
 
 #include <oneapi/tbb/task_arena.h>
@@ -16,8 +16,8 @@
 
 namespace q3d::pipeline::feed {
 
-// What weighs a 2D keypoint in the losses. The official code takes the annotation's v as it is, so that a 2
-// counts double; `label` takes 1, or a detector's likelihood.
+// The weight of a 2D keypoint in the losses. The official code takes the annotation's v as it is (`raw_v`),
+// so that a 2 counts double. `label` takes 1, or a detector's likelihood.
 enum class KeypointWeight { label, raw_v };
 
 struct FeedOptions {
@@ -26,7 +26,8 @@ struct FeedOptions {
   loaders::pictures::AugmentOptions augmentation{};
   KeypointWeight keypoint_weight = KeypointWeight::label;
   int threads = 0;  // that decode and warp; 0 = all cores. Changes no bit
-  // Of several ranks each takes its contiguous part of every batch, so that together they see what one would.
+  // With several ranks, each takes its contiguous part of every batch, so that together they see what one
+  // would.
   int rank = 0;
   int ranks = 1;
 };

@@ -15,7 +15,7 @@
 
 namespace q3d::pipeline::feed {
 
-// What training needs of a sample, in the shard's units and frames.
+// The part of a sample that training needs, in the shard's units and frames.
 struct TrainingSample {
   std::vector<std::byte> crop;  // encoded picture
   loaders::pictures::Affine crop_from_image{};

@@ -48,7 +48,7 @@ void leave_out_leaks(const config::BuildConfig& config, manifests::DigestCache& 
   ingest.leakage = std::move(report.summary);
 }
 
-// Over what a leak says, since it is the user's own word.
+// A veto overrides leakage, because the user decided explicitly.
 void apply_veto(const std::filesystem::path& file, candidates::Ingest& ingest) {
   if (file.empty()) return;
   candidates::Veto& veto = ingest.veto.emplace(candidates::read_veto(file));
@@ -67,7 +67,7 @@ void apply_veto(const std::filesystem::path& file, candidates::Ingest& ingest) {
   }
 }
 
-// What is left out changes a unit's labels, not its predictions.
+// An exclusion changes a unit's labels, not its predictions.
 std::string label_digest(const candidates::Unit& unit, const std::vector<candidates::Candidate>& candidates) {
   std::string text;
   for (std::size_t i = unit.first; i < unit.first + unit.count; ++i) {

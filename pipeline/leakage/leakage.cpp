@@ -108,7 +108,7 @@ struct HashedPictures {
   }
 };
 
-// For each picture of the pool the test picture it is a copy of.
+// The test picture that a picture of the pool is a copy of.
 struct Copy {
   std::size_t test_picture = 0;
   CopyEvidence evidence = CopyEvidence::same_file;
@@ -141,7 +141,8 @@ std::vector<std::optional<Copy>> find_copies(const Pictures& pool, const Picture
   return copies;
 }
 
-// Of pictures that look alike, and of files of one content, which are one picture elsewhere here.
+// Adds the groups of pictures that look alike. Files of one content are in a group too, although they count
+// as one picture elsewhere in this file.
 void add_groups(const Pictures& pool, const PictureHashes& known, int max_distance, LeakageReport& report) {
   std::vector<bool> is_grouped(pool.list.size());
   const auto add_files = [&](std::size_t place, std::vector<std::size_t>& samples) {

@@ -11,7 +11,7 @@
 
 namespace q3d::pipeline::leakage {
 
-// How a copy was recognised, the surest first.
+// The ways in which a copy is recognised, the surest first.
 enum class CopyEvidence { same_file, same_origin, looks_alike };
 std::string_view to_string(CopyEvidence evidence);  // same file, same origin, looks alike
 

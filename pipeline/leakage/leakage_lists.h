@@ -1,4 +1,4 @@
-// What leakage found, as files: leaks.csv, duplicates.csv and leakage.json.
+// Writes what leakage found as files: leaks.csv, duplicates.csv and leakage.json.
 #pragma once
 
 #include <filesystem>

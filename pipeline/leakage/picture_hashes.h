@@ -16,7 +16,7 @@ struct PictureFile {
   std::string sha256;
   int orientation = 1;  // EXIF's, by which the dataset turns the picture
 
-  // What its hash is remembered by: the SHA-256, and the orientation if it turns the picture.
+  // The key of the remembered hash: the SHA-256, and the orientation if it turns the picture.
   std::string key() const;
 };
 

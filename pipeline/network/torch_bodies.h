@@ -11,7 +11,7 @@ namespace q3d::pipeline::network {
 // Throws std::runtime_error naming file and tensor.
 std::unique_ptr<device::BodyMeshes> load_body_meshes(const std::filesystem::path& smal_asset);
 
-// Whether the asset is the synthetic quadruped of the rendered world. Throws likewise.
+// Returns whether the asset is the synthetic quadruped of the rendered world. Throws likewise.
 bool is_synthetic_body(const std::filesystem::path& smal_asset);
 
 // Threads of the calling thread's LibTorch operators from now on; at least 1.
@@ -20,7 +20,7 @@ void use_compute_threads(int threads);
 // Reads a file of priors (model/priors.h), or a checkpoint that holds them. Throws std::runtime_error naming
 // file and tensor.
 device::PriorNumbers read_priors(const std::filesystem::path& path);
-// Whether the file holds them at all. Throws std::runtime_error naming the file.
+// Returns whether the file holds priors at all. Throws std::runtime_error naming the file.
 bool has_priors(const std::filesystem::path& path);
 
 }  // namespace q3d::pipeline::network

@@ -26,12 +26,12 @@ inline constexpr std::uintmax_t kSmallCheckpointBytes = std::uintmax_t{64} << 20
 // std::filesystem::filesystem_error when the checkpoint is missing.
 int compute_threads(const config::NetworkConfig& network);
 
-// What of device and threads decides the bits: "cpu-2", "cuda". Part of the stage keys; loads nothing.
-// Throws as load_network does.
+// Names what decides the result's bits, of device and threads: "cpu-2", "cuda". It is part of the stage keys.
+// Loads nothing. Throws as load_network does.
 std::string device_key(const config::NetworkConfig& network);
 
-// What the checkpoint says of the pictures that it knows; `unknown` if it says nothing. Throws
-// std::runtime_error naming the file.
+// Returns what the checkpoint says of the pictures that its network knows, or `unknown` if it says nothing.
+// Throws std::runtime_error naming the file.
 device::NetworkDomain read_domain(const std::filesystem::path& checkpoint);
 
 // A seeded checkpoint of a named size ("vith", "small", "lite", "tiny"), with the weights of the pre-trained

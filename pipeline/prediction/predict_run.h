@@ -22,7 +22,8 @@ struct PredictedAnimal {
   int image_height_px = 0;
   device::BodyPrediction body;  // meaningful when failure is none; the adapted one where there is one
 
-  // Only of an animal that was adapted: L_proj of the iterates 0..n in crop units, and which one `body` is.
+  // These are set only for an animal that was adapted: L_proj of the iterates 0..n in crop units, and which
+  // of them `body` is.
   std::vector<double> curve;
   int best_iteration = 0;
 };

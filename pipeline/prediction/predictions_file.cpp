@@ -10,7 +10,8 @@ namespace {
 
 using nlohmann::ordered_json;
 
-// Where a point of the crop lies in the picture. The crop is not turned, so its axes are the picture's.
+// Returns where a point of the crop lies in the picture. The crop is not turned, so its axes are the
+// picture's.
 std::array<double, 2> in_picture(const smal::CropPoint& point, const loaders::pictures::SquareBox& box) {
   return {box.center_x_px + box.side_px * point.x, box.center_y_px + box.side_px * point.y};
 }

@@ -70,7 +70,7 @@ struct RayDevice::Handle {
 };
 
 RayDevice::RayDevice() : handle_(std::make_unique<Handle>()) {
-  // Not "threads=1": Embree would hold all of TBB, and with it the whole program, to one thread.
+  // With "threads=1", Embree would hold all of TBB, and with it the whole program, to one thread.
   handle_->device = rtcNewDevice("start_threads=0");
   if (handle_->device == nullptr) {
     throw std::runtime_error("ray tracing: Embree cannot start (error " +

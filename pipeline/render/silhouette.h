@@ -1,4 +1,4 @@
-// Which pixels of the network's crop a mesh covers.
+// A silhouette is the set of pixels of the network's crop that a mesh covers.
 #pragma once
 
 #include <array>

@@ -21,7 +21,8 @@ using nlohmann::ordered_json;
 
 static_assert(std::endian::native == std::endian::little, "glTF is little-endian");
 
-// From the crop camera's axes to those of 3D programs: half a turn about x, which keeps faces as they are.
+// Changes from the crop camera's axes to those of 3D programs. This is half a turn about x, which keeps faces
+// as they are.
 Eigen::Vector3f turned(const Eigen::Vector3f& vertex) {
   return {vertex.x(), -vertex.y(), -vertex.z()};
 }

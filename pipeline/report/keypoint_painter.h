@@ -24,8 +24,8 @@ std::span<const Bone> bones();
 // Blue for the left, orange for the right, white for the middle.
 const cv::Scalar& colour_of(Side side);
 
-// Where a point of the network's crop lies in a square tile that shows `context` times the crop. x and y in
-// crop units.
+// Returns where a point of the network's crop lies in a square tile that shows `context` times the crop. x
+// and y in crop units.
 cv::Point2d to_tile(double x, double y, int tile_side_px, double context);
 
 // Draws the visible annotated keypoints as discs, with their bones. `projected` may be null; else each of its

@@ -22,7 +22,7 @@ std::string printable(const std::string& text) {
   return shown;
 }
 
-// How many bytes of `word` fit into the width: at least one character.
+// Returns how many bytes of `word` fit into the width, but at least one character.
 std::size_t fitting(const std::string& word, int width_px, TextSize size) {
   std::size_t count = 1;
   while (count < word.size() && text_width_px(word.substr(0, count + 1), size) <= width_px) ++count;

@@ -17,7 +17,7 @@ constexpr int kRaysPerSide = 2;  // of a pixel
 constexpr float kAmbient = 0.4F;
 constexpr double kFilledShare = 0.84;  // of a tile, by the side view
 
-// From the surface to the light: from the upper left, behind the camera.
+// The direction from the surface to the light, which is at the upper left, behind the camera.
 const Eigen::Vector3f kToLight = Eigen::Vector3f(-0.35F, -0.65F, -0.75F).normalized();
 
 // A normal for each vertex: the sum of its triangles' normals, which weighs them by their area.

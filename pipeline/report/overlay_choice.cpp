@@ -73,7 +73,7 @@ std::vector<VerdictRow> spread(const std::vector<VerdictRow>& rows, std::size_t 
   return chosen;
 }
 
-// At most `most` for each part of an id.
+// Returns at most `most` rows for each part of an id.
 std::vector<VerdictRow> named(const std::vector<VerdictRow>& rows, const std::vector<std::string>& ids,
                               std::size_t most) {
   std::vector<VerdictRow> found;

@@ -1,4 +1,4 @@
-// Which candidates of a dataset are looked at.
+// Chooses the candidates of a dataset that are shown.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// Overlays: the bodies of one candidate drawn over its photograph, panel beside panel.
+// Draws overlays: the bodies of one candidate over its photograph, panel beside panel.
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -70,7 +70,7 @@ class OverlayPainter {
   MeshPainter painter_;
 };
 
-// What the colours mean, in one strip of this width.
+// Draws a legend of the colours, in one strip of this width.
 cv::Mat overlay_legend(int width_px);
 
 // The pictures below each other or in `columns` columns, on paper, each as wide as the widest, and the legend

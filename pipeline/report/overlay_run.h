@@ -44,7 +44,7 @@ class MissingBodyModel : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-// Where the body model of a dataset lies. Throws MissingBodyModel, and as SourceFiles::body_model.
+// Returns where the body model of a dataset lies. Throws MissingBodyModel, and as SourceFiles::body_model.
 std::filesystem::path find_body_model(const dataset::PublishedDataset& dataset, const SourceFiles& files,
                                       const std::filesystem::path& given);
 

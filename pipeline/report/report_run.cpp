@@ -32,8 +32,8 @@ std::string text_of_file(const fs::path& file) {
   return fs::exists(file) ? manifests::read_file(file) : std::string();
 }
 
-// What the two files depend on. Pictures and stage tables lie outside the dataset, but a page that was made
-// with them stays right.
+// Returns a key of all that the two files depend on. Pictures and stage tables lie outside the dataset, but a
+// page that was made with them stays right.
 std::string key_of(const dataset::PublishedDataset& dataset, const ReportOptions& options, bool has_bodies,
                    const std::string& tsne) {
   const dataset::DatasetManifest& manifest = dataset.manifest();

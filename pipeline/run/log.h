@@ -1,6 +1,6 @@
-// What the library has to say while it works. The library itself never prints: it hands each line to a sink,
-// which the program that uses it sets. The command line writes them to stderr, a test collects them, and
-// without a sink they are dropped.
+// The log takes what the library has to say while it works. The library itself never prints: it hands each
+// line to a sink, which the program that uses it sets. The command line writes them to stderr, a test
+// collects them, and without a sink they are dropped.
 //
 // This is not spdlog, because a run writes some ten such lines. spdlog is built on fmt, and LibTorch ships an
 // fmt of its own that must not meet another one at link time (cmake/Q3dTargets.cmake says how they are kept

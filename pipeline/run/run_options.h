@@ -1,4 +1,4 @@
-// What every run over an output folder is told beside its configuration.
+// Every run over an output folder takes these options beside its configuration.
 #pragma once
 
 #include <filesystem>

@@ -40,7 +40,7 @@ std::filesystem::path StageStore::file(const candidates::Unit& unit) const {
   return unit_file(folder_, unit.index);
 }
 
-// What the journal says of the unit, if its file is there with the right size.
+// Returns what the journal says of the unit, if its file is there with the right size.
 std::optional<manifests::JournalEntry> StageStore::claimed(const candidates::Unit& unit) {
   std::optional<manifests::JournalEntry> entry;
   {

@@ -28,7 +28,7 @@ class StageStore {
   StageStore(const std::filesystem::path& out, const std::string& stage, const std::string& key,
              std::string candidates::Unit::*digest = &candidates::Unit::input_digest);
 
-  // Whether the unit is finished. The first call of a run reads the unit's file whole. Throws
+  // Returns whether the unit is finished. The first call of a run reads the unit's file whole. Throws
   // manifests::IoError when a file that is there cannot be read; so do the next two.
   bool has(const candidates::Unit& unit) { return entry(unit).has_value(); }
   std::optional<manifests::JournalEntry> entry(const candidates::Unit& unit);

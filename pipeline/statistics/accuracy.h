@@ -1,4 +1,4 @@
-// How well predictions and labels fit the annotated keypoints.
+// Measures how well predictions and labels fit the annotated keypoints.
 #pragma once
 
 #include <nlohmann/json.hpp>

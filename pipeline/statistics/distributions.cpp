@@ -17,7 +17,7 @@ constexpr int kErrorBins = 60;
 constexpr double kShownShare = 0.98;
 constexpr double kBeyondTauHigh = 1.1;
 
-// Where the histogram of errors ends.
+// Returns the error at which the histogram of errors ends.
 double last_error(std::vector<double> errors, const dataset::DatasetManifest& manifest) {
   double last = quantile(errors, kShownShare).value_or(1.0);
   for (const auto& [name, thresholds] : manifest.thresholds) {

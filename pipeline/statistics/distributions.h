@@ -1,4 +1,4 @@
-// How the candidates' numbers are spread: errors, adaptation, visible keypoints, sizes.
+// Distributions show how the candidates' numbers are spread: errors, adaptation, visible keypoints, sizes.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -13,11 +13,11 @@ namespace q3d::pipeline::statistics {
 // threshold, are within. Null where no prediction was judged.
 nlohmann::ordered_json error_histogram(const Facts& facts, const dataset::DatasetManifest& manifest);
 
-// Of the adapted candidates, at most `most`, evenly spread: {adapted, shown, iterations, best_iteration,
-// gain, before, after, kept: [...]}. Null where none was adapted.
+// Returns at most `most` of the adapted candidates, evenly spread: {adapted, shown, iterations,
+// best_iteration, gain, before, after, kept: [...]}. It is null where none was adapted.
 nlohmann::ordered_json adaptation(const Facts& facts, std::size_t most = 2500);
 
-// How many candidates, and how many kept ones, have 0 to 26 visible keypoints.
+// Counts how many candidates, and how many kept ones, have 0 to 26 visible keypoints.
 nlohmann::ordered_json visible_keypoints(const Facts& facts);
 
 // The combined trust of the kept labels, 20 bins from 0 to 1: {low, high, beyond, counts}. Null where none

@@ -48,7 +48,7 @@ bool is_guarded(const ordered_json& document) {
   return false;
 }
 
-// Whether thresholds decide about it: a prediction that the fidelity rule judged.
+// Returns whether thresholds decide about the candidate, because the fidelity rule judged its prediction.
 bool is_open(const CandidateFacts& candidate) {
   return candidate.role == config::Role::pseudo && candidate.row.is_judged() &&
          candidate.row.judgement.verdict != manifests::Verdict::failed;

@@ -1,4 +1,4 @@
-// What the page's threshold explorer needs to judge every candidate again under other thresholds.
+// The page's threshold explorer needs these numbers to judge every candidate again under other thresholds.
 #pragma once
 
 #include <nlohmann/json.hpp>

@@ -1,4 +1,4 @@
-// What is known of each candidate of a finished dataset, gathered once for all statistics.
+// Gathers what is known of each candidate of a finished dataset, once for all statistics.
 #pragma once
 
 #include <array>
@@ -13,8 +13,8 @@
 
 namespace q3d::pipeline::statistics {
 
-// How well a body's keypoints fit the annotated ones. Distances are Euclidean, in crop units (crop side = 1),
-// and NaN where the keypoint is not visible.
+// Says how well a body's keypoints fit the annotated ones. Distances are Euclidean, in crop units (crop side
+// = 1), and NaN where the keypoint is not visible.
 struct Fit {
   std::array<float, smal::kNumKeypoints> distance{};
   double auc = 0.0;  // filters::auc with the whole crop as normaliser, 0 to 1

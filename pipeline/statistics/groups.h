@@ -1,4 +1,4 @@
-// How many candidates went in and how many labels came out, by what they show.
+// Counts how many candidates went in and how many labels came out, by what they show.
 #pragma once
 
 #include <nlohmann/json.hpp>

@@ -33,7 +33,7 @@ struct Histogram {
   void add(double value);  // NaN is not counted
 };
 
-// At most `most` of `count` positions, evenly spread and ascending.
+// Returns at most `most` of `count` positions, evenly spread and ascending.
 std::vector<std::size_t> spread_positions(std::size_t count, std::size_t most);
 
 }  // namespace q3d::pipeline::statistics

@@ -1,4 +1,4 @@
-// How the labels' shapes are spread: principal components, and whether the families form groups.
+// Shows how the labels' shapes are spread: principal components, and whether the families form groups.
 #pragma once
 
 #include <nlohmann/json.hpp>

@@ -12,7 +12,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-// What dataset.json itself says, for people who read the page: absent in older datasets.
+// Adds what dataset.json itself says to people who read the page. Older datasets lack it.
 void add_said(const ordered_json& document, const char* key, ordered_json& list) {
   if (!document.contains(key) || !document[key].is_array()) return;
   for (const ordered_json& line : document[key]) list.push_back(line);

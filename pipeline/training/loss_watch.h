@@ -12,7 +12,7 @@ struct LossWatch {
   double mean = 0.0;
   std::int64_t seen = 0;
 
-  // What is wrong with the loss of a step, or nothing; then the loss joins the mean.
+  // Returns what is wrong with the loss of a step. If nothing is wrong, the loss joins the mean.
   std::optional<std::string> check(double loss, double gradient_norm, double divergence_factor);
 };
 

@@ -220,12 +220,13 @@ model::EncoderTrainerOptions encoder_options(const TrainingConfig& config, const
   return options;
 }
 
-// Of the draws of a phase.
+// Returns the seed of the draws of a phase.
 std::uint64_t phase_seed(const TrainingConfig& config, int phase_index) {
   return manifests::Rng(config.seed, {static_cast<std::uint64_t>(phase_index)}).next();
 }
 
-// Of dropout and stochastic depth in one step: ranks differ, and a resumed run needs no stored generator.
+// Returns the seed of dropout and stochastic depth in one step. Ranks have different seeds, and a resumed run
+// needs no stored generator.
 std::uint64_t step_seed(const TrainingConfig& config, const TrainingPosition& position, int rank) {
   return manifests::Rng(config.seed,
                         {static_cast<std::uint64_t>(position.phase),

@@ -35,11 +35,11 @@ struct TrainingSummary {
 // A run that was stopped or killed goes on from the newest state, with the weights that it would have had
 // anyway (same device, same compute threads, same number of ranks).
 //
-// Under a launcher of several ranks (model/ranks/rank_place.h) each calls this and trains on its part of
-// every batch; rank 0 alone writes, into a folder that all can read. Throws ConfigError when `out` holds
-// another configuration's run or the ranks do not fit each other, Interrupted on Ctrl-C after saving the
-// state, and std::runtime_error naming the batch's sample ids when loss or gradient are not finite or the
-// loss diverges, or when another rank is gone; the newest state then stays as it is.
+// Under a launcher of several ranks (model/ranks/rank_place.h), each rank calls this and trains on its part
+// of every batch. Rank 0 alone writes, into a folder that all can read. Throws ConfigError when `out` holds
+// another configuration's run or the ranks do not fit each other. Throws Interrupted on Ctrl-C, after saving
+// the state. Throws std::runtime_error when another rank is gone, and, naming the batch's sample ids, when
+// loss or gradient are not finite or the loss diverges; the newest state then stays as it is.
 TrainingSummary train(const settings::TrainingConfig& config, const TrainingOptions& options);
 
 }  // namespace q3d::pipeline::training

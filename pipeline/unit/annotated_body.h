@@ -21,10 +21,10 @@ device::BodyPrediction annotated_body(const manifests::BodyTruth& truth);
 // A sample without a body: zeros, camera and projection NaN.
 device::BodyPrediction no_body();
 
-// Whether keypoints_2d holds a projection.
+// Returns whether keypoints_2d holds a projection.
 bool has_projection(const smal::CropPoints& keypoints_2d);
 
-// What a truth's label will lack, in words; empty when it lacks nothing.
+// Returns what a truth's label will lack, in words. The text is empty when it lacks nothing.
 std::string missing_parts(const manifests::BodyTruth& truth);
 
 }  // namespace q3d::pipeline::unit

@@ -18,7 +18,8 @@ namespace {
 
 using manifests::Verdict;
 
-// Of the families' mean bodies, in the pose of the template: bones keep their lengths in any other.
+// Returns the range of limb lengths of the families' mean bodies, in the pose of the template. Bones keep
+// their lengths in every other pose.
 filters::LimbRange family_limbs(const device::PriorNumbers& priors, const device::BodyMeshes& meshes) {
   std::vector<smal::Body> bodies;
   for (const auto& betas : priors.family_betas) {

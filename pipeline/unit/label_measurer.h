@@ -13,7 +13,7 @@
 
 namespace q3d::pipeline::unit {
 
-// What labels are measured with.
+// The models that labels are measured with.
 struct MeasuringModels {
   std::unique_ptr<device::BodyMeshes> meshes;
   std::optional<device::PriorNumbers> priors;  // without them the scores that need them are NaN

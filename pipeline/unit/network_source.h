@@ -1,4 +1,4 @@
-// Where the steps of a unit get the network from.
+// The steps of a unit get the network from a source.
 #pragma once
 
 #include <functional>

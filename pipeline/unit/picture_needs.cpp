@@ -12,9 +12,9 @@ namespace {
 using filters::Band;
 using manifests::Reason;
 
-// What a candidate needs at each point of its way, as far as its facts ask for it: patches are for pseudo
-// labels, stored crops for what goes to a shard, masks for what is measured against them. A patch is needed
-// once more when a label is measured, because its mirror image is predicted.
+// The table says what a candidate needs at each point of its way, as far as its facts ask for it. Pseudo
+// labels need patches, samples of a shard need stored crops, and candidates that are measured against a mask
+// need the mask. A patch is needed once more when a label is measured, because its mirror image is predicted.
 struct Needs {
   Standing standing;
   bool decoding;  // even if no part is needed
@@ -22,7 +22,7 @@ struct Needs {
   bool stored_crop;
   bool patch_mask;
 };
-// In the order of Standing.
+// The rows are in the order of Standing.
 constexpr std::array<Needs, 4> kNeeds{{
     // standing             decoding  patch  stored_crop  patch_mask
     {Standing::unpredicted, true, true, true, true},

@@ -1,4 +1,4 @@
-// What the steps to come need of a candidate's picture, as a decision table.
+// A decision table says what the steps to come need of a candidate's picture.
 #pragma once
 
 #include <cstddef>
@@ -10,7 +10,7 @@
 
 namespace q3d::pipeline::unit {
 
-// How far a candidate has come when its unit is decoded.
+// Says how far a candidate has come when its unit is decoded.
 enum class Standing : std::uint8_t {
   unpredicted,  // its picture must be decoded, if only to learn whether it can be
   to_adapt,     // the rule adapts its prediction, which has not been done
@@ -18,7 +18,7 @@ enum class Standing : std::uint8_t {
   finished,     // it failed, it was dropped, or the run makes predictions only
 };
 
-// What decides which parts of a picture are needed.
+// The facts that decide which parts of a picture are needed.
 struct PictureFacts {
   Standing standing = Standing::finished;
   bool is_pseudo = false;       // its label comes from the network

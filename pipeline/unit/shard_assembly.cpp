@@ -38,7 +38,7 @@ void take_crop(ShardSample& sample, EncodedCrop& crop) {
   sample.crop_from_image = crop.from_image;
 }
 
-// By position; null where there is none.
+// Returns the crop of each position in the unit, or null where there is none.
 std::vector<EncodedCrop*> crops_by_position(UnitWork& work) {
   std::vector<EncodedCrop*> crops(work.candidates.size(), nullptr);
   for (EncodedCrop& crop : work.crops) crops.at(crop.sample) = &crop;

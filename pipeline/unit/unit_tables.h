@@ -1,4 +1,4 @@
-// What predict, refine, measure and crops put on disk for one unit, as tables.
+// The stages predict, refine, measure and crops put these tables on disk for one unit.
 #pragma once
 
 #include <span>

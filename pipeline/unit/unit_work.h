@@ -16,8 +16,8 @@
 
 namespace q3d::pipeline::unit {
 
-// What predict knows of one candidate: the body of its label to be, from the network or, by its role, from
-// the annotation file; or why it failed.
+// The result of predict for one candidate: the body from which its label is made, or why it failed. The body
+// comes from the network or, depending on the role, from the annotation file.
 struct PredictedSample {
   manifests::Reason failure = manifests::Reason::none;
   std::string detail;  // of the failure, or a remark (a mask that was left out)
@@ -27,7 +27,7 @@ struct PredictedSample {
   device::BodyPrediction body;  // meaningful when failure is none; no_body() for 2d_only
 };
 
-// What refine knows of one candidate of the middle band.
+// The result of refine for one candidate of the middle band.
 struct RefinedSample {
   std::size_t sample = 0;              // position within the unit
   std::vector<double> curve;           // L_proj of iterates 0..n, crop units
@@ -35,7 +35,7 @@ struct RefinedSample {
   std::vector<double> held_out_curve;  // the held-out keypoints' error of the same iterates; empty without
 };
 
-// What was measured of one candidate that the fidelity rule keeps: all trust scores but the combined one.
+// The measurements of one candidate that the fidelity rule keeps: all trust scores but the combined one.
 struct MeasuredLabel {
   std::size_t sample = 0;  // position within the unit
   manifests::TrustScores scores;
@@ -83,7 +83,7 @@ struct UnitWork {
   std::vector<DecodedSample> decoded;            // by position; freed once the stored crops are encoded
   std::vector<manifests::Judgement> judgements;  // by position
 
-  // Of the candidates that this build or an earlier one kept, in the order of `sample`.
+  // The crops of the candidates that this build or an earlier one kept, in the order of `sample`.
   std::vector<EncodedCrop> crops;
   std::size_t crops_encoded = 0;  // how many of them were encoded in this run
 };

@@ -27,8 +27,8 @@ class AnimalLayer {
   cv::Mat1b paint(cv::Mat& picture, const PictureCamera& camera, const Ground& ground, const Light& light,
                   const CoatPainter& painter, const Coat& coat, const Eigen::Vector3f& individual) const;
 
-  // For points of the body (camera frame, with translation): 1 where the body itself stands before the point
-  // by more than its tolerance (SMAL units).
+  // Returns 1 for each point of the body (camera frame, with translation) that the body itself hides by more
+  // than the point's tolerance (SMAL units), else 0.
   std::vector<std::uint8_t> hidden(std::span<const Eigen::Vector3f> points,
                                    std::span<const float> tolerance) const;
 

@@ -26,9 +26,9 @@ nlohmann::json superanimal_annotations(std::span<const FinishedPicture> pictures
 // Animal Kingdom's MPII-style list (protocol 3, mammals).
 nlohmann::json animal_kingdom_annotations(std::span<const FinishedPicture> pictures);
 
-// What is true of pictures whose set says less: {"pictures": {<image as listed>: {...}}}. Keypoints are
-// SMAL's 26: pixels with v = 1 inside the picture (hidden or not), else 0; 3D in the camera frame without
-// translation.
+// Returns all that is true of pictures whose annotation file says less: {"pictures": {<image as listed>:
+// {...}}}. Keypoints are SMAL's 26: pixels with v = 1 inside the picture (hidden or not), else 0; 3D in the
+// camera frame without translation.
 nlohmann::json truth_annotations(std::span<const FinishedPicture> pictures);
 
 }  // namespace q3d::pipeline::world

@@ -1,4 +1,5 @@
-// How people label what they see: points they miss, guess, confuse or place a little off.
+// The annotator labels what it sees as people do: it misses, guesses and confuses points, or places them a
+// little off.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,7 +11,7 @@
 
 namespace q3d::pipeline::world {
 
-// What is true of a landmark in a picture.
+// The truth about a landmark in a picture.
 struct SeenLandmark {
   Eigen::Vector2d px{0.0, 0.0};
   bool exists = false;

@@ -1,4 +1,4 @@
-// What lies around the animal: sky or wall, distance, ground and the things that stand on it.
+// A backdrop lies around the animal: sky or wall, distance, ground and the things that stand on it.
 #pragma once
 
 #include <array>

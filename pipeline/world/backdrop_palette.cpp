@@ -177,7 +177,8 @@ float drawn(const Range& range, manifests::Rng& rng) {
   return static_cast<float>(rng.uniform(range.low, range.high));
 }
 
-// What is above the horizon: weather outside, leaves in a forest, a wall in a room, a screen in a studio.
+// Draws what is above the horizon: weather outside, leaves in a forest, a wall in a room, a screen in a
+// studio.
 void draw_sky(Backdrop& b, manifests::Rng& rng) {
   const double weather = rng.uniform();
   if (b.place == Place::forest) {

@@ -13,8 +13,8 @@
 
 namespace q3d::pipeline::world {
 
-// What the network is to find: SMAL's pose (axis-angle, rad; the first three are the global orientation) and
-// shape.
+// The parameters that the network is to find: SMAL's pose (axis-angle, rad; the first three numbers are the
+// global orientation) and shape.
 struct Posture {
   std::array<float, 3 * smal::kNumJoints> pose{};
   std::array<float, smal::kNumBetas> betas{};

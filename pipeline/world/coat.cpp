@@ -128,7 +128,7 @@ Colour CoatPainter::ground_colour(const Coat& coat, const BodyZone& zone, float 
   return colour;
 }
 
-// How strongly the marking's colour covers the coat, 0 to 1.
+// Returns how strongly the marking's colour covers the coat, 0 to 1.
 float CoatPainter::marking(const Coat& coat, const BodyZone& zone, const Eigen::Vector3f& individual) const {
   const Eigen::Vector3f p = zone.rest;
   const float scale = coat.mark_scale;

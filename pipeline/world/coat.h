@@ -33,7 +33,7 @@ struct Coat {
   float gloss = 0.1F;
 };
 
-// Where on the body a point lies; interpolates linearly over triangles.
+// The place of a point on the body. It interpolates linearly over triangles.
 struct BodyZone {
   Eigen::Vector3f rest;  // position on the resting template
   float leg = 0.0F, foot = 0.0F, head = 0.0F, muzzle = 0.0F, ear = 0.0F, tail = 0.0F, tail_tip = 0.0F;

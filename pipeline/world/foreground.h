@@ -1,4 +1,4 @@
-// What stands between the camera and the animal.
+// Draws what stands between the camera and the animal.
 #pragma once
 
 #include <opencv2/core.hpp>

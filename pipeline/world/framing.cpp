@@ -57,7 +57,7 @@ Extent clipped(Extent extent, cv::Size picture_px) {
   return extent;
 }
 
-// Where the animal's bounding box is to lie, drawn before its exact proportions are known.
+// The intended place of the animal's bounding box, drawn before its exact proportions are known.
 struct Placement {
   double side_px;
   cv::Point2d centre_px;

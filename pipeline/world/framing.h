@@ -1,4 +1,5 @@
-// Where the animal stands in the picture, the annotator's box around it, and the camera that follows.
+// Framing places the animal in the picture, draws the annotator's box around it, and derives the camera from
+// the box.
 //
 // The network's crop camera has focal 1000 px for a crop scaled to 256 px and its principal point in the
 // crop's centre. A picture is therefore rendered with that very camera, carried to its own pixels: focal 1000
@@ -14,7 +15,7 @@
 
 namespace q3d::pipeline::world {
 
-// How one dataset frames its animals.
+// The habits of one dataset in framing its animals.
 struct FramingHabits {
   double fill_low = 0.5, fill_high = 0.9;  // longer side of the animal, share of the picture's shorter side
   double truncated = 0.1;                  // share of pictures in which the animal runs out of the picture

@@ -210,7 +210,8 @@ class SurfacePlaces {
     return best;
   }
 
-  // On the skin, at the side of `side` but the height and length of the vertex `level`.
+  // Finds the vertex on the skin that lies to the side as `side` does, but at the height and length of the
+  // vertex `level`.
   int nearest(const Eigen::Vector3f& side, int level) const {
     const Eigen::Vector3f& line = rest_.vertices[static_cast<std::size_t>(level)];
     const Eigen::Vector3f target(line.x(), line.y() - 0.05F, 0.6F * side.z());
@@ -254,7 +255,8 @@ std::string mirrored(std::string name) {
   return name;
 }
 
-// Where people disagree by several pixels: no edge or colour tells where the point is.
+// Returns whether people disagree about the place by several pixels, because no edge or colour tells where
+// the point is.
 bool is_vague(std::string_view place) {
   for (const std::string_view part : {"thigh", "shoulder", "neck", "throat", "back_base", "back_middle",
                                       "back_end", "belly", "flank", "hip", "tail_mid"}) {

@@ -24,7 +24,8 @@ std::vector<Landmark> animal3d_landmarks(const RestMesh& rest);        // 26
 std::vector<Landmark> superanimal_landmarks(const RestMesh& rest);     // 39
 std::vector<Landmark> animal_kingdom_landmarks(const RestMesh& rest);  // 23
 
-// Where the landmarks are on a body, camera frame without translation; (0, 0, 0) for what does not exist.
+// Returns where the landmarks are on a body, in the camera frame without translation. A landmark that does
+// not exist is at (0, 0, 0).
 std::vector<Eigen::Vector3f> landmark_points(const std::vector<Landmark>& landmarks, const Body& body);
 
 }  // namespace q3d::pipeline::world

@@ -1,4 +1,4 @@
-// What a camera does to a picture, and what its owner does to it afterwards.
+// A lens applies what a camera does to a picture, and what its owner does to it afterwards.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// From a plan to a picture and everything that is true of it.
+// Makes a picture from a plan, and states everything that is true of it.
 #pragma once
 
 #include <array>

@@ -61,7 +61,7 @@ std::string kingdom_name(const PicturePlan& plan, std::uint64_t seed) {
   return fmt::format("dataset/{}/{}_f{:06d}.jpg", name, name, frame);
 }
 
-// What the annotation file says, and where the mask goes.
+// Sets the picture's name in the annotation file, and the path of the mask.
 void complete_paths(PicturePlan& plan) {
   const std::string_view folder = domain_of(plan.set).folder;
   const auto without = [](std::string_view path, std::string_view head) { return path.substr(head.size()); };

@@ -1,4 +1,5 @@
-// Which pictures a dataset gets: species, names and, where several belong together, their common origin.
+// A plan says which pictures a dataset gets: species, names and, where several belong together, their common
+// origin.
 #pragma once
 
 #include <cstdint>

@@ -39,7 +39,7 @@ int vertex_of(const std::vector<Landmark>& landmarks, const char* name) {
       ->vertex;
 }
 
-// Where the ear grows out of the head: its vertex nearest to the eye.
+// Returns where the ear grows out of the head, which is its vertex nearest to the eye.
 int ear_root(const RestMesh& rest) {
   constexpr std::size_t kLeftEarJoint = 33;
   Eigen::Vector3f eye = Eigen::Vector3f::Zero();

@@ -15,7 +15,7 @@ enum class Family : int { felidae, canidae, equidae, bovidae, hippopotamidae };
 inline constexpr int kFamilies = 5;
 std::string_view to_string(Family family);
 
-// How a species differs from the centre of its family: relative changes of lengths, 0.1 = a tenth more.
+// The relative changes of lengths by which a species differs from its family's centre: 0.1 is a tenth more.
 struct Build {
   float legs = 0.0F;   // elbow and stifle to the ground
   float neck = 0.0F;   // withers to the head

@@ -49,7 +49,7 @@ nlohmann::json options_of(const WorldOptions& options) {
           {"share", options.share}};
 }
 
-// What an earlier run left. Returns its counts when it is the same world, finished.
+// Reads what an earlier run left. Returns its counts if it is the same world and finished.
 std::optional<nlohmann::json> finished_world(const WorldOptions& options) {
   const fs::path file = options.out / "world.json";
   if (!fs::exists(file)) return std::nullopt;

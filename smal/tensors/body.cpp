@@ -143,7 +143,8 @@ struct SmalBody::Rig {
     const torch::Device device = asset.v_template.device();
     const auto dtype = asset.v_template.scalar_type();
     tree = make_tree(asset.parents, device);
-    // In double, because these two sums over all vertices would otherwise carry the largest rounding error.
+    // These two sums over all vertices are computed in double, because they would otherwise carry the largest
+    // rounding error.
     const torch::Tensor regressor = asset.j_regressor.to(torch::kFloat64);
     joint_rest = torch::matmul(regressor, asset.v_template.to(torch::kFloat64)).to(dtype);
     joint_shapedirs = torch::matmul(regressor, asset.shapedirs.to(torch::kFloat64).flatten(1))

@@ -132,7 +132,7 @@ TEST(BootstrapOfSets, IsTheDifferenceOfTheMembersMeans) {
   const BootstrapInterval interval = bootstrap_of_sets(
       std::vector{1.0, kOut, 3.0, kOut}, std::vector{kOut, 5.0, 7.0, kOut}, own_pictures(4), {});
   EXPECT_DOUBLE_EQ(interval.mean, 4.0);
-  // Over two runs: (1 + 2 + 6) / 3 against 10.
+  // The mean over two runs is (1 + 2 + 6) / 3 against 10.
   const BootstrapInterval runs = bootstrap_of_sets(std::vector{1.0, 2.0, 6.0, kOut},
                                                    std::vector{kOut, 10.0, 10.0, 10.0}, own_pictures(2), {});
   EXPECT_DOUBLE_EQ(runs.mean, 7.0);

@@ -98,7 +98,7 @@ TEST(Calibrate, RandomPoolsMeetTheirTargetsWithinOneSample) {
     expect_shares_are_true(result, pool);
     const Counts counts = judge(pool, result.thresholds);
     EXPECT_LE(std::abs(counts.retained - shares.retained * size), 0.5 + 1e-9);
-    // As many as there are to be had.
+    // It takes as many as there are.
     const auto passing = std::count_if(pool.begin(), pool.end(), [&](const auto& sample) {
       return sample.passes_adaptation && sample.initial_error >= result.thresholds.tau_low;
     });

@@ -191,7 +191,7 @@ TEST(Fidelity, TheGainIsMeasuredWithinTheWindowOnly) {
 }
 
 TEST(Fidelity, ASmallGainDiscardsBelowTauLowToo) {
-  // From 0.28125 to just below 0.25: a gain of 0.11.
+  // The error falls from 0.28125 to just below 0.25, which is a gain of 0.11.
   const double below = std::nextafter(0.25, 0.0);
   const Judgement judgement = judge_adapted(std::vector{0.28125, below, 0.3}, make_thresholds());
   EXPECT_EQ(judgement.verdict, Verdict::discarded);

@@ -181,7 +181,7 @@ TEST(HeldOut, ThePapersRuleComesFirst) {
 }
 
 TEST(HeldOut, ASmallGainDiscardsBelowTauLowToo) {
-  // From 0.28: a gain of 0.14, and below tau_low at iterate 2.
+  // The error begins at 0.28. It gains 0.14 and is below tau_low at iterate 2.
   const std::vector<double> curve{0.28, 0.26, 0.24};
   EXPECT_EQ(judge_held_out(curve, std::vector{0.5, 0.4, 0.3}, make_thresholds()).reason,
             Reason::gain_too_small);

@@ -28,7 +28,7 @@ constexpr double kBody = 24.0 * kRounding;
 constexpr double kMmPerUnit = 1000.0;
 constexpr double kFullCropPx = 256.0;
 
-// Whether a keypoint is within a threshold is decided by a distance that the official code rounds to float32.
+// The official code rounds a distance to float32 before it decides whether a keypoint is within a threshold.
 // A threshold that is lower or higher by this share gives what it may have found instead.
 constexpr double kThresholdShare = 8.0 * kRounding;
 
@@ -49,10 +49,10 @@ Values crop_values(const torch::Tensor& tensor) {
   return smal::from_numbers<Values>(numbers);
 }
 
-// How far float32 may move a point that it aligns, in the unit of the points: a few roundings of the largest
-// coordinate for the scaled, turned and shifted point, and as many again times the condition of the rotation,
-// which comes from the singular values s of a 3 x 3 matrix: s1 / (s2 + s3), with s3 negative where a mirror
-// image must be avoided.
+// Returns how far float32 may move a point that it aligns, in the unit of the points: a few roundings of the
+// largest coordinate for the scaled, turned and shifted point, and as many again times the condition of the
+// rotation, which comes from the singular values s of a 3 x 3 matrix: s1 / (s2 + s3), with s3 negative where
+// a mirror image must be avoided.
 double alignment_rounding(const torch::Tensor& predicted, const torch::Tensor& truth) {
   const torch::Tensor from = predicted.to(torch::kFloat64);
   const torch::Tensor to = truth.to(torch::kFloat64);
@@ -101,7 +101,7 @@ class MetricsParity : public ::testing::Test {
   static smal::CropKeypoints annotated(std::size_t i) {
     return crop_values<smal::CropKeypoints>(golden("gt_keypoints_2d", i));
   }
-  // With the official rule: no visible keypoint counts as 0.
+  // By the official rule, a sample without visible keypoints counts as 0.
   static double official_pck(std::size_t i, double normaliser, double threshold) {
     return pck(projected(i), annotated(i), normaliser, threshold).value_or(0.0);
   }
@@ -182,7 +182,7 @@ TEST_F(MetricsParity, ProcrustesAlignedKeypoints) {
   }
 }
 
-// Of a perfect prediction the official code finds its own rounding, and we find nothing.
+// For a perfect prediction, the official code finds its own rounding and we find 0.
 TEST_F(MetricsParity, PaMpjpe) {
   for (std::size_t i = 0; i < cases_.size(); ++i) {
     const double tolerance = alignment_rounding(golden("pred_keypoints_3d", i), true_keypoints_3d(i));

@@ -17,7 +17,7 @@ constexpr const char* kTopology = R"({"name": "mine", "keypoints": ["eye_l", "ey
   "flip_pairs": [["eye_l", "eye_r"]],
   "animal3d26": {"left_eye": "eye_l", "right_eye": "eye_r", "nose": "snout"}})";
 
-// What every later stage relies on.
+// Checks what every later stage relies on.
 void check(const SampleRecord& record) {
   if (record.failure == Reason::none) {
     const auto& box = record.box;
@@ -36,7 +36,7 @@ void check(const SampleRecord& record) {
   } else {
     require(!record.failure_detail.empty(), "a failure says what was found", record.id);
   }
-  // What ingest does: the record is written as JSON, which refuses texts that are cut within a character.
+  // Ingest writes the record as JSON, which refuses texts that are cut within a character.
   SampleRecord back;
   nlohmann::json::parse(nlohmann::json(record).dump()).get_to(back);
   require(record_digest(back) == record_digest(record), "a record survives its own JSON", record.id);

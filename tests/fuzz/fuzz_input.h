@@ -1,4 +1,4 @@
-// What fuzz targets share: one scratch folder for the whole run, and checks that stop it.
+// Fuzz targets share one scratch folder for the whole run, and checks that stop it.
 //
 // A target is LLVMFuzzerTestOneInput: libFuzzer calls it with inputs that it breeds, replay.cpp with those
 // that lie in folders. It checks what a reader promises of any bytes whatever: a value, or a

@@ -8,8 +8,8 @@ extern "C" const char* __lsan_default_suppressions() {
   return "leak:libhdf5";
 }
 
-// And reads beyond its buffers on some (loaders/formats/label_hdf5.cpp says what is done about it); without
-// this no run would come to anything else.
+// It also reads beyond its buffers on some files (loaders/formats/label_hdf5.cpp says what is done about it).
+// Without these options no run would find anything else.
 extern "C" const char* __asan_default_suppressions() {
   return "interceptor_via_lib:libhdf5";
 }
@@ -20,7 +20,7 @@ void check_whole(const q3d::loaders::formats::LabelTable& table) {
   q3d::fuzz::require(table.values.size() == table.rows.size() * table.columns.size(), "a table is whole");
 }
 
-// Of the tables in tests/data/deeplabcut.
+// These are the topologies of the tables in tests/data/deeplabcut.
 constexpr const char* kTopology = R"({"name": "goats", "keypoints": ["eye_l", "eye_r", "snout", "horn"],
   "flip_pairs": [["eye_l", "eye_r"]],
   "animal3d26": {"left_eye": "eye_l", "right_eye": "eye_r", "nose": "snout"}})";

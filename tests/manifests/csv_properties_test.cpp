@@ -1,4 +1,4 @@
-// What is written as CSV is read back unchanged, whatever the cells hold.
+// A table that is written as CSV is read back unchanged, whatever the cells hold.
 #include <gtest/gtest.h>
 
 #include <string>
@@ -13,7 +13,7 @@ namespace {
 
 using Rows = std::vector<std::vector<std::string>>;
 
-// At least two cells a row: a row that is one empty cell reads as an empty line, which is passed over.
+// A row has at least two cells, because a row of one empty cell reads as an empty line, which is skipped.
 Rows any_rows() {
   const auto row = rc::gen::suchThat(rc::gen::container<std::vector<std::string>>(testing::awkward_text()),
                                      [](const std::vector<std::string>& cells) { return cells.size() >= 2; });

@@ -83,7 +83,7 @@ RC_GTEST_PROP(JournalProperties, AKillAtAnyByteLeavesThePrefixOfWholeLines, ()) 
   assert_holds(journal, latest(entries, kept));
   RC_ASSERT(journal.dropped_torn_line() == (cut != whole_bytes));
 
-  // What is appended next stands where the torn line began.
+  // The next line that is appended stands where the torn line began.
   std::vector<JournalEntry> continued(entries.begin(), entries.begin() + static_cast<std::ptrdiff_t>(kept));
   continued.push_back(any_entry());
   journal.append(continued.back());

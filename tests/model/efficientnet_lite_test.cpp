@@ -25,7 +25,7 @@ std::shared_ptr<EfficientNetLite> shipped_network(torch::ScalarType dtype) {
   return network;
 }
 
-// What the package efficientnet-lite-pytorch computes (tests/data/efficientnet/make.py).
+// Reads what the package efficientnet-lite-pytorch computed (tests/data/efficientnet/make.py).
 class Golden : public ::testing::Test {
  protected:
   // The pictures as PrimaNet takes them.
@@ -60,7 +60,7 @@ TEST_F(Golden, FeaturesInFloat32DifferByItsRounding) {
   EXPECT_LT(error.item<double>(), 1e-5 * features().abs().max().item<double>());
 }
 
-// Also while it trains: batch norm has the statistics of ImageNet, and none of the batch.
+// The same holds while it trains: batch norm uses the statistics of ImageNet, and none of the batch.
 TEST_F(Golden, APictureDoesNotSeeItsNeighbours) {
   const auto network = shipped_network(torch::kFloat64);
   ASSERT_TRUE(network->is_training());

@@ -76,7 +76,7 @@ class ForwardParity : public ::testing::TestWithParam<std::string> {
   Prediction predict(const Prima& prima) const {
     return prima.predict(prima.encode(testing::parity_images(prima, input_index())), /*with_vertices=*/true);
   }
-  // How far the official code's own float32 output is from its float64 one.
+  // Returns how far the official code's own float32 output is from its float64 one.
   double stated_noise(const std::string& name) const {
     std::ifstream stream(testing::parity_dir() / ("forward_" + GetParam() + ".json"));
     return nlohmann::json::parse(stream).at("meta").at("fp32_vs_fp64_max_abs").at(name);

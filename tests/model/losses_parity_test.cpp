@@ -113,7 +113,7 @@ class LossesParity : public ::testing::TestWithParam<std::string> {
     return total_loss(loss_terms(predict(prima), targets_, priors_, variant), weights_of(meta_));
   }
 
-  // Of the loss, by the parameters' names.
+  // Returns the gradients of the loss, by the parameters' names.
   TensorMap gradients(const Prima& prima,
                       settings::LossVariant variant = settings::LossVariant::official) const {
     prima.net().train();
@@ -198,8 +198,8 @@ TEST_P(Float32LossesParity, EachTerm) {
   expect_terms("term_", terms(targets_), 1e-3);
 }
 
-// On rotations the two ways to an axis and an angle agree, and so do their gradients; float64 leaves nothing
-// but the division by the sine of the angle between them.
+// On rotations, the two ways to compute an axis and an angle agree, and so do their gradients. In float64
+// they differ only by the division by the sine of the angle.
 TEST_P(LossesParity, SoundVariantHasTheSameGradients) {
   const TensorMap sound = gradients(prima_, settings::LossVariant::sound);
   for (const auto& [name, official] :

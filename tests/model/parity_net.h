@@ -36,12 +36,12 @@ torch::Tensor parity_images(const model::Prima& prima, const torch::Tensor& inde
 // The largest relative change that rounding to float32 makes to a number.
 inline constexpr double kFloat32Rounding = 0x1p-24;
 
-// How far float32 arithmetic may carry each tensor of `compute` from its exact value. Float32 computes what
-// exact arithmetic would give for slightly other weights, so the float64 network is run four times more with
-// every weight moved by a random part of kFloat32Rounding. The result holds, for each tensor, the largest
-// absolute change: one number for the whole tensor, but one a matrix for rotations (..., 3, 3), because a
-// joint whose 6D columns are short or nearly parallel amplifies rounding more than its neighbours do. Shapes
-// let the result be compared with the tensor.
+// Returns how far float32 arithmetic may carry each tensor of `compute` from its exact value. Float32
+// computes what exact arithmetic would give for slightly other weights, so the float64 network is run four
+// times more with every weight moved by a random part of kFloat32Rounding. The result holds, for each tensor,
+// the largest absolute change: one number for the whole tensor, but one a matrix for rotations (..., 3, 3),
+// because a joint whose 6D columns are short or nearly parallel amplifies rounding more than its neighbours
+// do. Shapes let the result be compared with the tensor.
 TensorMap float32_noise(const std::string& which, const model::PrimaConfig& config,
                         const std::function<TensorMap(const model::Prima&)>& compute);
 
@@ -49,7 +49,8 @@ TensorMap float32_noise(const std::string& which, const model::PrimaConfig& conf
 // not just the weights.
 inline constexpr double kNoiseFactor = 16.0;
 
-// Likewise for our own float32 against float64, wide: it must hold for every processor's order of summation.
+// The same bound for our own float32 against float64. It is wide, because it must hold for every processor's
+// order of summation.
 inline constexpr double kFloat32Factor = 64.0;
 
 // A few float32 roundings of the tensor's largest number: for what depends on no weight, or hardly.

@@ -61,7 +61,7 @@ TEST_F(Stem, AnInitialNetworkHasItsValuesAndTellsItsOrigin) {
   EXPECT_EQ(plain.metadata().count("stem_origin"), 0U);
 }
 
-// As a trained network ships: half precision on disk, float32 in memory.
+// A trained network ships like this: half precision on disk, float32 in memory.
 TEST_F(Stem, HalfPrecisionKeepsTheFeatures) {
   smal::tensors::save_asset(path("body"), testing::load_parity_asset(testing::parity_dir()));
   write_initial_checkpoint(path("full"), sizes(), 7, torch::kFloat32, shipped_);

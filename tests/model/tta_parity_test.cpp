@@ -79,8 +79,8 @@ TensorMap adapted(const Case& which, const Prima& prima, std::int64_t first, std
   return all;
 }
 
-// How far the official float32 run is from a float64 one, where the golden file states it: for ten fast
-// iterations. Empty where it does not. The table's "pose" is of all rotations.
+// Returns how far the official float32 run is from a float64 one. The golden file states it for ten fast
+// iterations; elsewhere the result is empty. The table's "pose" covers all rotations.
 std::optional<double> stated_noise(const Case& which, std::int64_t sample, const std::string& name) {
   std::ifstream file(testing::parity_dir() / ("tta_" + std::get<0>(which) + ".json"));
   const nlohmann::json tables = nlohmann::json::parse(file).at("meta").at("fp32_vs_fp64_max_abs");
@@ -106,7 +106,7 @@ class TtaParity : public ::testing::TestWithParam<Case> {
   bool is_slow() const { return std::get<2>(GetParam()) == "1e-6"; }
   torch::Tensor golden(const std::string& name) const { return file_.tensor(name).to(torch::kFloat64); }
 
-  // As float32_noise has it, once for all tests of a case.
+  // Calls float32_noise once for all tests of a case.
   const TensorMap& noise() const {
     static std::map<Case, TensorMap> known;
     TensorMap& noise = known[GetParam()];

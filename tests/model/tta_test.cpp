@@ -171,7 +171,7 @@ TEST_F(Tta, GivesUpWithoutGain) {
   }
 }
 
-// Of every instance's first visible keypoints, `count`.
+// Takes the first `count` visible keypoints of every instance.
 std::vector<std::vector<std::int64_t>> first_visible(const torch::Tensor& keypoints, std::size_t count) {
   std::vector<std::vector<std::int64_t>> chosen(static_cast<std::size_t>(keypoints.size(0)));
   for (std::size_t i = 0; i < chosen.size(); ++i) {

@@ -1,4 +1,4 @@
-// Where tests find their data and where they may write.
+// The folders in which tests find their data and may write.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@ inline std::filesystem::path parity_dir() {
   return given != nullptr && *given != '\0' ? std::filesystem::path(given) : data_dir() / "parity";
 }
 
-// What the project ships beside its code.
+// The folder of what the project ships beside its code.
 inline std::filesystem::path source_dir() {
   return data_dir().parent_path().parent_path();
 }

@@ -1,4 +1,4 @@
-// What the library said while a test ran.
+// Collects what the library said while a test ran.
 #pragma once
 
 #include <string>

@@ -1,4 +1,5 @@
-// When adaptation ends, by hand-made curves. The numbers are exact in binary, so boundaries are exact too.
+// These tests check by hand-made curves when adaptation ends. The numbers are exact in binary, so boundaries
+// are exact too.
 #include "filters/adaptation/schedule.h"
 
 #include <gmock/gmock.h>
@@ -17,7 +18,8 @@ using ::testing::ThrowsMessage;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-// At how many iterations an adaptation with this curve ends; the curve must be long enough.
+// Returns the number of iterations after which an adaptation with this curve ends. The curve must be long
+// enough.
 int end_of(const Schedule& schedule, const std::vector<double>& curve) {
   int best = 0;
   for (std::size_t taken = 0; taken < curve.size(); ++taken) {

@@ -224,7 +224,7 @@ TEST(CocoLabels, a_tool_s_word_is_no_species) {
   EXPECT_EQ(lab.load(document).records[0].species, "wombat");
 }
 
-// What tools write where nobody drew a box or knew a size.
+// Tools write these values where nobody drew a box or knew a size.
 TEST(CocoLabels, placeholders_are_absent_values) {
   const Lab lab;
   for (const json& box :

@@ -227,8 +227,8 @@ TEST(Load, ids_and_messages_stay_on_one_line_and_in_utf8) {
   EXPECT_NO_THROW(json(dataset.records[1].failure_detail).dump());
 }
 
-// What each broken value of a field must lead to. "@" in the JSON stands for a literal that JSON does not
-// know.
+// The reason that each broken value of a field must lead to. "@" in the JSON stands for a literal that JSON
+// does not know.
 struct Break {
   const char* field;
   const char* value;  // JSON text

@@ -1,5 +1,5 @@
-// What a reader of pictures and annotation files does when the system cannot read, or when memory runs out:
-// it stops, because neither says anything about the file.
+// A reader of pictures and annotation files stops when the system cannot read, or when memory runs out,
+// because neither says anything about the file.
 #include <gmock/gmock.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
@@ -102,7 +102,7 @@ TEST(UnreadableAnnotations, StopTheRunWithTheReason) {
       ThrowsMessage<std::runtime_error>(AllOf(HasSubstr("absent.json"), HasSubstr("annotation file"))));
 }
 
-// Whether a picture is there is asked before it is opened.
+// Before a picture is opened, the system is asked whether it is there.
 TEST(UnreadableFolders, DoNotMakeAPictureMissing) {
   const testing::ScratchDir scratch;
   testing_files::write_picture(scratch.path() / "images/a.png");

@@ -61,7 +61,7 @@ INSTANTIATE_TEST_SUITE_P(Spellings, Words,
                                            Spelling{"rearpaw_l", Side::left, End::back, Part::paw},
                                            Spelling{"belly_bottom", Side::none, End::none, Part::none}));
 
-// What is guessed must not contradict a published map; it may leave things out.
+// A guess must not contradict a published map, but it may leave keypoints out.
 TEST(Guess, agrees_with_the_published_maps) {
   const std::vector<std::string>& targets = topology("animal3d26").keypoints;
   for (const char* name : {"superanimal_quadruped", "animalpose_mmpose", "animal3d"}) {

@@ -30,7 +30,7 @@ std::filesystem::path fixture(const std::string& name) {
   return testing::data_dir() / "images" / name;
 }
 
-// What PIL's convert('RGB') made of a fixture (tests/data/images/make.py).
+// Returns what PIL's convert('RGB') made of a fixture (tests/data/images/make.py).
 cv::Mat expected_rgb(const std::string& name) {
   std::vector<std::byte> bytes = bytes_of(fixture(name + ".rgb"));
   EXPECT_EQ(bytes.size(), 16U * 24U * 3U) << name;

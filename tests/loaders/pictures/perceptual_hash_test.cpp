@@ -1,4 +1,4 @@
-// What the hash must see through, and what it must not.
+// The hash must see through some changes of a picture, and not through others.
 #include "loaders/pictures/perceptual_hash.h"
 
 #include <gtest/gtest.h>

@@ -78,7 +78,7 @@ TrainingBatch part_of(TrainingBatch batch, const RankPlace& place) {
   return batch;
 }
 
-// What one gets by averaging gradients and nothing else: losses that know of no other rank.
+// Averages gradients and nothing else, so that each rank's losses know of no other rank.
 class Naive : public Collective {
  public:
   explicit Naive(std::shared_ptr<const Collective> ranks) : ranks_(std::move(ranks)) {}

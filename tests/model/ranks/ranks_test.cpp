@@ -66,7 +66,7 @@ class Ranks : public ::testing::Test {
     return all;
   }
 
-  // What each rank wrote.
+  // Reads what each rank wrote.
   std::vector<smal::tensors::SafeTensors> results(const std::string& mode, int size) const {
     std::vector<smal::tensors::SafeTensors> files;
     std::vector<int> ranks(static_cast<std::size_t>(size));

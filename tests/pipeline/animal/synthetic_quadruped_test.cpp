@@ -107,7 +107,7 @@ TEST(SyntheticQuadruped, IsItsOwnMirrorImage) {
 }
 
 TEST(SyntheticQuadruped, KeypointsAreOnTheirSides) {
-  // From the order of the datasets' 26 keypoints: left, right.
+  // The pairs (left, right) follow from the order of the datasets' 26 keypoints.
   const std::vector<std::pair<int, int>> pairs = {{0, 1},   {3, 4},   {5, 6},   {8, 9},   {10, 11},
                                                   {12, 13}, {14, 15}, {16, 17}, {20, 21}, {22, 23}};
   const std::vector<int> middle = {2, 7, 18, 19, 24, 25};
@@ -134,8 +134,8 @@ TEST(SyntheticQuadruped, KeypointsAreOnTheirSides) {
   }
 }
 
-// Where SMAL's template has its keypoints (x, y; model units), the synthetic one's are not far: a body of the
-// same scale in the same axes.
+// The synthetic template has its keypoints near those of SMAL's template (x, y; model units), so it is a body
+// of the same scale in the same axes.
 TEST(SyntheticQuadruped, TemplateStandsWhereSmalsDoes) {
   const std::map<int, std::pair<double, double>> smal = {
       {4, {0.449, -0.461}},   {6, {-0.331, -0.525}}, {7, {-0.567, 0.209}},  {9, {0.317, -0.024}},

@@ -1,4 +1,4 @@
-// What is said about the quality of labels, by given errors and origins.
+// These tests check what is said about the quality of labels for given errors and origins.
 #include "pipeline/build/quality.h"
 
 #include <gmock/gmock.h>

@@ -71,7 +71,7 @@ class Rebuild : public ::testing::Test {
     write(scratch_.path() / "data" / name, {reinterpret_cast<const char*>(png.data()), png.size()});
   }
 
-  // In place, as damage comes: the inode stays, and so do other names of the file.
+  // Writes in place, as damage does: the inode stays, and so do other names of the file.
   static void write(const fs::path& path, std::string_view content) {
     fs::create_directories(path.parent_path());
     std::error_code ignored;

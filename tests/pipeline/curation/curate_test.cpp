@@ -1,4 +1,4 @@
-// From annotation files and a rule to a list, and from the list to the records of a build.
+// The tests go from annotation files and a rule to a list, and from the list to the records of a build.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -217,7 +217,7 @@ TEST_F(Curate, a_name_of_two_species_is_a_config_error) {
   EXPECT_THROW(run(document), run::ConfigError);
 }
 
-// What ships: 23 species, whose names are each listed once.
+// The rule that ships has 23 species, whose names are each listed once.
 TEST_F(Curate, the_shipped_rule_has_23_species) {
   const fs::path file = q3d::testing::source_dir() / "configs/quadruped2d.json";
   const CurationConfig config = load_curation_config({file});

@@ -27,7 +27,7 @@ class Verdicts : public ::testing::Test {
     while (auto row = reader.next()) rows.push_back(std::move(*row));
     return rows;
   }
-  // What is said of the table after `from` was replaced by `to`.
+  // Returns the error message for the table in which `from` was replaced by `to`.
   std::string message(const std::string& from, const std::string& to) {
     std::string text = kVerdicts;
     text.replace(text.find(from), from.size(), to);

@@ -122,7 +122,7 @@ TEST_F(Derived, DiffTellsCandidatesVerdictsAndLabels) {
   EXPECT_TRUE(std::is_sorted(other.labels.begin(), other.labels.end(), [](const auto& a, const auto& b) {
     return a.keypoints_3d_mm > b.keypoints_3d_mm;
   }));
-  // By hand, for one of them.
+  // The expected values for one of them are computed by hand.
   const auto change = std::find_if(other.labels.begin(), other.labels.end(),
                                    [](const auto& each) { return each.id == "zoo/train/b_0.jpg#0"; });
   ASSERT_NE(change, other.labels.end());

@@ -47,7 +47,7 @@ TEST(Domain, RefusesAnotherForm) {
   expect_refused(begin + R"("l_proj": {"1.5": 0.4}}})", "shares between 0 and 1");
 }
 
-// By hand: of 0, 1, 2, 3, 4 the quantile at share s is 4 s.
+// By hand, the quantile of 0, 1, 2, 3, 4 at share s is 4 s.
 TEST(Quantiles, AreInterpolatedLinearly) {
   const auto quantiles = quantiles_of({3, 0, 4, 1, 2}, {0.05, 0.5, 0.95});
   EXPECT_DOUBLE_EQ(quantiles[0].l_proj, 0.2);

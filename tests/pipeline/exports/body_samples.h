@@ -8,7 +8,7 @@
 
 namespace q3d::testing {
 
-// How much of the source picture's resolution the stored crop has.
+// The share of the source picture's resolution that the stored crop has.
 enum class Stored { whole, reduced };
 
 // A retained sample of the dataset zoo/train with a picture, a mask where `seed` is even, keypoints of which

@@ -1,5 +1,5 @@
-// From the rendered world's annotation files to training batches: a label that was packed is the world's
-// truth.
+// The tests go from the rendered world's annotation files to training batches. A label that was packed is the
+// world's truth.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -132,8 +132,8 @@ torch::Tensor tensor_of(const std::vector<float>& values, std::vector<std::int64
   return torch::tensor(values).view(shape);
 }
 
-// How far the batch's 3D keypoints are from those that its pose and shape give; relative to keypoint 0, as
-// the loss sees them, since a body turns about its root and not about the origin.
+// Returns how far the batch's 3D keypoints are from those that its pose and shape give. Both are relative to
+// keypoint 0, as the loss sees them, since a body turns about its root and not about the origin.
 double distance_from_body(const FeedBatch& batch, const fs::path& asset) {
   const smal::tensors::SmalBody body(smal::tensors::load_asset(asset));
   const c10::InferenceMode no_gradients;
@@ -183,7 +183,8 @@ TEST_F(PackedLabels, Animal3dProjectsOntoItsLabelsWithinTheirNoise) {
   expect_families(pool, *folder_ / "world/animal3d/train.json");
 }
 
-// Of rows of `width` numbers, the first negated and sides exchanged: the largest difference.
+// Returns the largest difference between rows of `width` numbers after the first number is negated and sides
+// are exchanged.
 double distance_from_mirror(const std::vector<float>& plain, const std::vector<float>& mirrored,
                             std::int64_t width) {
   const std::vector<int> flip = loaders::keypoints::topology("animal3d26").flip;

@@ -8,7 +8,7 @@
 namespace q3d::pipeline::run {
 namespace {
 
-// What a shell makes of the word.
+// Returns what a shell makes of the word.
 std::string as_a_shell_reads(const std::string& word) {
   std::FILE* shell = popen(("printf %s " + shell_word(word)).c_str(), "r");
   std::array<char, 256> text{};

@@ -142,7 +142,7 @@ TEST_F(TrainingRun, AKilledRunRepeatsStepsAfterItsNewestState) {
   run("killed", 2);
   std::filesystem::copy_file(path("killed/state.safetensors"), path("old"));
   run("killed", 1);
-  // As if the process had died before it saved step 3.
+  // The folder looks as if the process had died before it saved step 3.
   std::filesystem::rename(path("old"), path("killed/state.safetensors"));
   const TrainingSummary last = run("killed");
   EXPECT_EQ(manifests::read_file(straight.model), manifests::read_file(last.model));

@@ -95,7 +95,7 @@ TEST(GuardedJudging, BoundsActOnRetainedAndRefinedLabels) {
 TEST(GuardedJudging, IterationsAreScaledByVisibleKeypoints) {
   GivenUnit unit;
   unit.add(5, kError);
-  // In a quarter of the middle band: 10 + 50 / 4 = 22.5, up to 23.
+  // The limit is a quarter of the middle band: 10 + 50 / 4 = 22.5, rounded up to 23.
   EXPECT_EQ(unit.request().schedule.iterations, 23);
   EXPECT_FALSE(unit.request().schedule.held_out[0]);
   unit.rules.guards.iterations_full_at = 20;

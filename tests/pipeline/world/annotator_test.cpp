@@ -76,7 +76,7 @@ TEST(Annotate, SwapsExchangeTheTwoSidesAtTheStatedRate) {
     EXPECT_EQ(labels[0].x_px + labels[1].x_px, 60.0);
     swapped += labels[0].x_px == 50.0 ? 1 : 0;
   }
-  // Of the four kinds of swap, two (fore legs, everything) exchange fore paws.
+  // Two of the four kinds of swap (fore legs, everything) exchange fore paws.
   EXPECT_NEAR(swapped, 0.1 * kAnimals, 4 * std::sqrt(0.1 * 0.9 * kAnimals));
 }
 

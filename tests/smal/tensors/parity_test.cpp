@@ -79,10 +79,10 @@ class SmalParity : public ::testing::Test {
   static inline SmalBody* body_ = nullptr;
 };
 
-// How much larger rounding errors are in the second and third column than in the numbers: the second column
-// is what is left of the second vector across the first, brought to length 1. Where the two are parallel
-// hardly anything but rounding is left, and the columns may point anywhere. The guard against short vectors
-// (1e-12) keeps the number finite.
+// Returns how much larger rounding errors are in the second and third column than in the numbers. The second
+// column is what is left of the second vector across the first, brought to length 1. Where the two are
+// parallel hardly anything but rounding is left, and the columns may point anywhere. The guard against short
+// vectors (1e-12) keeps the number finite.
 torch::Tensor condition(const torch::Tensor& rot6d) {
   const torch::Tensor first = rot6d.index({Ellipsis, Slice(0, 3)});
   const torch::Tensor second = rot6d.index({Ellipsis, Slice(3, 6)});
