@@ -209,8 +209,7 @@ Columns keypoint_columns() {
   return {
       keypoint_numbers<double, 2>(
           "keypoints_px", {kNumKeypoints, 2}, "px",
-          "annotated 2D keypoints in the source image; with `resized: scale` they are "
-          "scaled to it",
+          "annotated 2D keypoints in the source image; with `resized: scale` they are scaled to it",
           {&Keypoint::x_px, &Keypoint::y_px}),
       keypoint_numbers<float, 1>("keypoints_v", {kNumKeypoints}, "",
                                  "the annotation file's own visibility or likelihood, verbatim",

@@ -27,8 +27,7 @@ struct Signature {
 constexpr std::array<Signature, 8> kSignatures{
     {{"version https://git-lfs", "a Git LFS pointer, which stands for the file: run `git lfs pull`"},
      {"PK\3\4",
-      "a ZIP archive, such as an .xlsx workbook or a packed export: unpack it, or save the sheet as "
-      "CSV"},
+      "a ZIP archive, such as an .xlsx workbook or a packed export: unpack it, or save the sheet as CSV"},
      {"\x1f\x8b", "a gzip archive: unpack it"},
      {"\x89HDF\r\n", "an HDF5 file"},
      {"%PDF", "a PDF document"},

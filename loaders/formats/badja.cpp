@@ -94,10 +94,8 @@ class BadjaLoader {
       if (entry.path().extension() == ".json") found.insert(entry.path());
     }
     if (!found.empty()) return {found.begin(), found.end()};
-    throw std::runtime_error(
-        fmt::format("{}: got a folder without .json files, expected BADJA's joint "
-                    "annotations",
-                    loading_.file.string()));
+    throw std::runtime_error(fmt::format(
+        "{}: got a folder without .json files, expected BADJA's joint annotations", loading_.file.string()));
   }
 
   void read_file(const fs::path& file) {

@@ -46,8 +46,7 @@ LabelSurvey survey_coco(const json& document, const fs::path& file) {
   if (survey.names.empty()) {
     throw std::runtime_error(
         fmt::format("{}: categories: got none that lists the names of its keypoints, expected a list "
-                    "\"keypoints\". Add it "
-                    "to the file, or write the topology by hand (docs/own-labels.md)",
+                    "\"keypoints\". Add it to the file, or write the topology by hand (docs/own-labels.md)",
                     file.string()));
   }
   return survey;
@@ -66,8 +65,7 @@ LabelSurvey survey_labelme_files(const std::vector<fs::path>& files) {
   LabelSurvey survey{files.front(), "LabelMe", "", {}, {}};
   survey.notes.push_back(
       "LabelMe's files do not load as they are: convert them to COCO, with the same names, and use the "
-      "format "
-      "\"coco\"");
+      "format \"coco\"");
   for (const fs::path& file : files) survey_labelme(manifests::read_json_file(file), survey);
   if (survey.names.empty()) {
     throw std::runtime_error(
@@ -139,8 +137,7 @@ LabelSurvey survey_folder(const fs::path& folder) {
   if (!documents.empty()) return survey_labelme_files({documents.begin(), documents.end()});
   throw std::runtime_error(
       fmt::format("{}: got a folder without labels, expected DeepLabCut's CollectedData files in or below "
-                  "it, or LabelMe's "
-                  ".json files in it",
+                  "it, or LabelMe's .json files in it",
                   folder.string()));
 }
 

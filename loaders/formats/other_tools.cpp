@@ -31,8 +31,7 @@ const std::vector<Form>& forms() {
       {true,
        {"image_id", "keypoints", "score"},
        "COCO's results, a list that names no pictures, expected COCO's whole form: an object with "
-       "\"images\", "
-       "\"annotations\" (these results) and \"categories\""},
+       "\"images\", \"annotations\" (these results) and \"categories\""},
       {true, {"data", "annotations"}, "Label Studio's own JSON, expected COCO: export the project as COCO"},
       {true, {"shapes", "imagePath"}, "LabelMe's JSON, expected COCO: convert it to COCO keypoints"}};
   return kForms;

@@ -178,8 +178,7 @@ class Guesser {
       case Part::shoulder:
         doubt(
             "the shoulder of the 26 is at the height of the withers; map yours to the front thigh if it is "
-            "at "
-            "the elbow");
+            "at the elbow");
         break;
       case Part::knee:
         if (words.end == End::back) {
@@ -206,8 +205,7 @@ class Guesser {
       const int partner = here < 0 ? -1 : topology_.flip[static_cast<std::size_t>(here)];
       if (here < 0 || (there >= 0 ? partner == there : partner == here)) continue;
       doubts_.push_back(fmt::format(
-          "\"{}\" looks like {}, but nothing that is its mirror image looks like {}; "
-          "it is left out",
+          "\"{}\" looks like {}, but nothing that is its mirror image looks like {}; it is left out",
           name(static_cast<std::size_t>(here)), animal3d.keypoints[i], animal3d.keypoints[mirror]));
       dropped_.insert(here);
     }

@@ -156,8 +156,7 @@ void require_stop_below(double stop_below, double tau_low) {
   if (stop_below <= tau_low) return;
   throw run::ConfigError(
       fmt::format("tta.stop_below is {}, but the pool's tau_low is {:.6g}, and adaptation may not end above "
-                  "tau_low. Give "
-                  "a smaller number, or leave the key out",
+                  "tau_low. Give a smaller number, or leave the key out",
                   stop_below, tau_low));
 }
 

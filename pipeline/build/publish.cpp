@@ -42,8 +42,7 @@ void check_sums(const candidates::Ingest& ingest, const std::vector<manifests::J
       counts.retained + counts.refined != rows) {
     throw std::runtime_error(
         fmt::format("the books do not balance: {} candidates, {} retained + {} refined + {} discarded + {} "
-                    "failed, {} rows in "
-                    "shards",
+                    "failed, {} rows in shards",
                     candidates, counts.retained, counts.refined, counts.discarded, counts.failed, rows));
   }
 }

@@ -26,10 +26,8 @@ std::string outside_domain(const PoolErrors& pool, double median, double bound,
                            const device::NetworkDomain& domain) {
   return fmt::format(
       "half of the {} predictions for the dataset {} have an L_proj above {:.4f}, but 95 % of the pictures "
-      "that "
-      "the network was tested on ({}) lie below {:.4f}: the network does not know such pictures, and its "
-      "labels "
-      "are not to be trusted",
+      "that the network was tested on ({}) lie below {:.4f}: the network does not know such pictures, and "
+      "its labels are not to be trusted",
       pool.errors.size(), pool.dataset, median, domain.held_out, bound);
 }
 
@@ -57,16 +55,14 @@ std::vector<Warning> quality_warnings(const std::vector<PoolErrors>& pools, cons
     if (pool.is_rendered || origins.domain.pictures != device::Pictures::rendered) return std::string();
     return fmt::format(
         "the pictures of the dataset {} count as photographs, and the network has seen rendered pictures "
-        "alone "
-        "({}): its labels of photographs are not to be trusted. {}",
+        "alone ({}): its labels of photographs are not to be trusted. {}",
         pool.dataset, origins.domain.trained_on, kForPhotographs);
   });
   warn(WarningKind::rendered_body, [&](const PoolErrors& pool) {
     if (pool.is_rendered || !origins.has_rendered_body) return std::string();
     return fmt::format(
         "the pictures of the dataset {} count as photographs, and the body model is the synthetic quadruped "
-        "of "
-        "the rendered world, which is not SMAL and has the shape of no animal. {}",
+        "of the rendered world, which is not SMAL and has the shape of no animal. {}",
         pool.dataset, kForPhotographs);
   });
   return warnings;
@@ -77,11 +73,10 @@ void require_below_ceiling(const std::string& dataset, double tau_high, double t
   throw std::runtime_error(fmt::format(
       "tau_high{} is {:.4g}, above filter.tau_ceiling = {:.4g} crop units: nothing is published, because a "
       "prediction that lies so far from the annotated keypoints is hardly better than a guess, and "
-      "adaptation "
-      "cannot make a label of it. Most often the network does not know such pictures, or the annotations are "
-      "wrong (swapped sides, another picture, another order of the keypoints). Look at some of them with "
-      "`inspect` and `explain`. A smaller share of labels (calibrate.refined) gives a lower tau_high; "
-      "--above-ceiling goes on all the same",
+      "adaptation cannot make a label of it. Most often the network does not know such pictures, or the "
+      "annotations are wrong (swapped sides, another picture, another order of the keypoints). Look at some "
+      "of them with `inspect` and `explain`. A smaller share of labels (calibrate.refined) gives a lower "
+      "tau_high; --above-ceiling goes on all the same",
       dataset.empty() ? "" : fmt::format(" of the dataset {}", dataset), tau_high, tau_ceiling));
 }
 

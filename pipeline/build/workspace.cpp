@@ -60,8 +60,7 @@ Workspace::Workspace(const config::BuildConfig& config, const run::RunOptions& o
       origins_.domain.pictures == device::Pictures::unknown) {
     run::log_note(
         fmt::format("{} does not say which pictures its network knows, so nothing can be said about whether "
-                    "these are like "
-                    "them",
+                    "these are like them",
                     config.network.checkpoint.filename().string()));
   }
 }

@@ -81,8 +81,7 @@ Corrections read_corrections(const std::filesystem::path& file) {
 
 std::string corrections_text(const std::map<std::string, std::vector<CorrectedPoint>>& points) {
   std::string text =
-      "# sample id, keypoint, x, y (px of the source picture), v: for `quadruped3d build "
-      "--corrections`\n";
+      "# sample id, keypoint, x, y (px of the source picture), v: for `quadruped3d build --corrections`\n";
   for (const auto& [id, corrected] : points) {
     for (const CorrectedPoint& point : corrected) {
       text += fmt::format("{}\t{}\t{}\t{}\t{}\n", id, names().at(point.keypoint), point.x_px, point.y_px,

@@ -51,8 +51,7 @@ std::string without_root(std::string text, const std::filesystem::path& root) {
 
 std::string note_of(const Corrections& corrections, const std::filesystem::path& file) {
   return fmt::format(
-      "corrections {}: the keypoints of {} candidates are replaced; {} of its ids are no "
-      "candidate's",
+      "corrections {}: the keypoints of {} candidates are replaced; {} of its ids are no candidate's",
       file.filename().string(), corrections.matched, corrections.points.size() - corrections.matched);
 }
 

@@ -149,8 +149,7 @@ class PictureFit {
     }
     if (agrees(stated, size.exchanged())) {
       return ": width and height are exchanged, so the labels belong to the picture before it was turned, "
-             "and it "
-             "has no EXIF orientation that would turn it back";
+             "and it has no EXIF orientation that would turn it back";
     }
     if (const auto factor = uniform_factor(stated, size)) {
       return fmt::format(

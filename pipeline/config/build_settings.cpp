@@ -80,8 +80,7 @@ const Settings<DatasetConfig>& dataset_settings() {
        .description =
            "`prima` (Animal3D, CtrlAni3D and every set in the same JSON form), `superanimal` (COCO with 39 "
            "keypoints), `animal_kingdom` (23 keypoints, MPII or COCO style), `stanfordextra`, `badja`; "
-           "`coco`, "
-           "`deeplabcut`, `sleap` and `lightning_pose` (any keypoints, described by a topology); "
+           "`coco`, `deeplabcut`, `sleap` and `lightning_pose` (any keypoints, described by a topology); "
            "`photographs` (no keypoints, for `predict` alone). See docs/datasets.md",
        .words = loaders::formats::dataset_formats(),
        .is_required = true},
@@ -165,8 +164,7 @@ const Settings<DatasetConfig>& own_label_settings() {
        .description =
            "for tables whose rows number the frames of a video (not `coco`): the number of the picture that "
            "shows frame 0, 1 for pictures that ffmpeg numbered. Without it the pictures must have the "
-           "frames' "
-           "own numbers",
+           "frames' own numbers",
        .range = {.least = 0}},
       {.key = "species",
        .member = &DatasetConfig::species,
@@ -176,8 +174,7 @@ const Settings<DatasetConfig>& own_label_settings() {
       {.key = "min_confidence",
        .member = &DatasetConfig::min_confidence,
        .description = "keypoints with a lower confidence get weight 0; of the format `photographs`, boxes "
-                      "with a lower score "
-                      "are left out",
+                      "with a lower score are left out",
        .range = {.least = 0, .most = 1}},
       {.key = "box_margin",
        .member = &DatasetConfig::box_margin,

@@ -53,8 +53,7 @@ void require_one_device(const std::string& text, const std::string& where) {
   if (count == 1) return;
   throw run::ConfigError(
       fmt::format("{}: got {} devices (\"{}\"), and one process uses one device so far. Name one of them. "
-                  "Training can use "
-                  "several by a process each, with torchrun (docs/training.md)",
+                  "Training can use several by a process each, with torchrun (docs/training.md)",
                   where, count, text));
 }
 

@@ -111,10 +111,9 @@ std::string_view in_words(double mean_error) {
 std::string quality_sentence(const DatasetManifest& manifest) {
   if (!manifest.all.mean_final_error) return "no label has a projection to compare with the keypoints.";
   const double mean = *manifest.all.mean_final_error;
-  std::string told = fmt::format(
-      "the labels lie {} the annotated keypoints: {:.1f} % of the crop's side off "
-      "on average",
-      in_words(mean), 100 * mean);
+  std::string told =
+      fmt::format("the labels lie {} the annotated keypoints: {:.1f} % of the crop's side off on average",
+                  in_words(mean), 100 * mean);
   if (manifest.all.mean_initial_error && *manifest.all.mean_initial_error > mean) {
     told += fmt::format(", {:.1f} % as predicted", 100 * *manifest.all.mean_initial_error);
   }

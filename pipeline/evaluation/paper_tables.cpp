@@ -66,8 +66,7 @@ const std::vector<PaperTable>& tables_of_the_paper() {
         {"PRIMA, Stage 1", {92.0, 79.8, 90.0, 83.9, 38.9, 57.8}},
         {"PRIMA, Stage 3", {92.5, 83.5, 91.1, 83.7, 37.8, 57.3}}},
        "Real sets of this kind have no masks: then 2D numbers are normalised by the whole crop and come out "
-       "higher "
-       "than by the mask. The summary names the normaliser of each row."},
+       "higher than by the mask. The summary names the normaliser of each row."},
       {"Ablations (table 3); evaluate a network that was trained with `network.without` to fill the last row",
        {{"Animal3D PAJ", "animal3d", Metric::pa_mpjpe},
         {"PAV", "animal3d", Metric::pa_mpvpe},
@@ -169,8 +168,7 @@ std::string show_adaptation(const Tables& tables) {
               {"method", "PAJ before", "after", "PAV before", "after", "AUC before", "after"}) +
          line("PRIMA, Stage 1", {75.3, 71.7, 79.5, 75.9, 89.6, 91.5}) + line(kOurs, ours) +
          "\nThe paper adapts 10 to 60 iterations by the error of the sample; `--tta N` takes N for all. "
-         "Adaptation "
-         "sees the test keypoints, so its AUC flatters it.\n\n";
+         "Adaptation sees the test keypoints, so its AUC flatters it.\n\n";
 }
 
 std::string show_clusters(const Tables& tables) {
@@ -186,8 +184,7 @@ std::string show_clusters(const Tables& tables) {
          line("the paper's true shapes", {0.99}, 2) + line(kOurs, {ours}, 2) +
          line("this evaluation's true shapes", {truth}, 2) +
          "\nk-means with five clusters. The paper does not state its clustering; compare with the true "
-         "shapes of the "
-         "same row.\n";
+         "shapes of the same row.\n";
 }
 
 }  // namespace

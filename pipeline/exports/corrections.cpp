@@ -165,8 +165,7 @@ CocoChanges coco_changes(const fs::path& export_folder, const fs::path& correcte
     }
     if (picture.annotations.size() > 1 || exported.annotations.size() != 1) {
       fail(corrected,
-           fmt::format("{}: got {} annotations, expected one, since each exported picture shows one "
-                       "sample",
+           fmt::format("{}: got {} annotations, expected one, since each exported picture shows one sample",
                        name, picture.annotations.size()));
     }
     try {

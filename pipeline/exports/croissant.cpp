@@ -11,8 +11,7 @@ using nlohmann::ordered_json;
 
 constexpr const char* kPaper =
     "Xiaohang Yu, Ti Wang and Mackenzie Weygandt Mathis: PRIMA: Boosting Animal Mesh Recovery with "
-    "Biological "
-    "Priors and Test-Time Adaptation. arXiv:2606.02366, 2026.";
+    "Biological Priors and Test-Time Adaptation. arXiv:2606.02366, 2026.";
 
 // The @context of the specification.
 ordered_json context() {
@@ -103,9 +102,8 @@ std::string croissant_text(const CroissantDataset& dataset) {
       {"citeAs", citation},
       {"rai:dataLimitations",
        "Labels of the kinds retained and refined are pseudo labels: a network predicted them, and a rule on "
-       "the "
-       "reprojection error of 2D keypoints decided which to keep. A small 2D error does not prove a right 3D "
-       "pose."},
+       "the reprojection error of 2D keypoints decided which to keep. A small 2D error does not prove a "
+       "right 3D pose."},
       {"distribution", distribution},
       {"recordSet", record_sets}};
   if (!dataset.sources.empty()) document["isBasedOn"] = dataset.sources;

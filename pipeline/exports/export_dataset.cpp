@@ -166,8 +166,7 @@ class Exporter {
     }
     throw std::runtime_error(fmt::format(
         "sample {}: its box gives a crop at ({}, {}) px of side {}, expected ({}, {}) and {}: the label's "
-        "crop "
-        "was not made from this box",
+        "crop was not made from this box",
         sample.record.id, square.center_x_px, square.center_y_px, square.side_px, centre.x, centre.y, side));
   }
 

@@ -174,8 +174,7 @@ void Feed::fill(FeedBatch& batch, std::int64_t slot) const {
     crop = loaders::pictures::decode_stored(sample.crop, 3);
   } catch (const std::runtime_error& error) {
     throw std::runtime_error(
-        fmt::format("pool {}: sample {}: its stored crop cannot be decoded: {}; `verify` "
-                    "checks the shards",
+        fmt::format("pool {}: sample {}: its stored crop cannot be decoded: {}; `verify` checks the shards",
                     pool.name(), pool.id(draw.sample), error.what()));
   }
   const loaders::pictures::Patch patch = loaders::pictures::warp_patch(

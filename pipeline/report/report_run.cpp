@@ -63,8 +63,7 @@ ordered_json tsne_of(const std::string& text, const dataset::DatasetManifest& ma
   ordered_json tsne = ordered_json::parse(text, nullptr, /*allow_exceptions=*/false);
   if (tsne.is_object() && tsne.value("content_id", "") == manifest.content_id) return tsne;
   run::log_warning(
-      fmt::format("{}: it is not of this dataset ({}) and is not shown; tools/shape_tsne.py makes it "
-                  "again",
+      fmt::format("{}: it is not of this dataset ({}) and is not shown; tools/shape_tsne.py makes it again",
                   file.string(), manifest.content_id.substr(0, 16)));
   return nullptr;
 }

@@ -64,8 +64,7 @@ class Gatherer {
     if (units_without_tables_ > 0) {
       facts.missing.push_back(
           fmt::format("The stages' tables of {} units are gone or were made anew for other candidates. Of "
-                      "their candidates, "
-                      "only those that were kept have keypoints and errors here.",
+                      "their candidates, only those that were kept have keypoints and errors here.",
                       units_without_tables_));
     }
     return facts;

@@ -41,8 +41,7 @@ Draft draft_topology(const DraftOptions& options) {
   if (!options.out.empty() && fs::exists(options.out) && !options.replaces) {
     throw run::ConfigError(
         fmt::format("{}: there is such a file already, and it may hold corrections; give --force to write "
-                    "over it, or another "
-                    "--out",
+                    "over it, or another --out",
                     options.out.string()));
   }
   Draft draft{loaders::formats::survey_labels(options.from), {}, {}};

@@ -40,8 +40,7 @@ std::optional<StoredState> load_state(const std::filesystem::path& path, const s
   if (entry(state.file, kKey) != key) {
     throw run::ConfigError(
         fmt::format("{}: this run was begun with another configuration, other pools or other assets; give "
-                    "another --out, or "
-                    "remove the folder to begin again",
+                    "another --out, or remove the folder to begin again",
                     path.parent_path().string()));
   }
   try {

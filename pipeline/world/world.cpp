@@ -72,8 +72,7 @@ void clear_unfinished(const fs::path& out) {
     if (!fs::exists(out / folder)) continue;
     if (!fs::exists(marker)) {
       throw std::runtime_error(
-          fmt::format("world: {} already holds {}, which is not part of a world; choose another "
-                      "folder",
+          fmt::format("world: {} already holds {}, which is not part of a world; choose another folder",
                       out.string(), folder));
     }
     fs::remove_all(out / folder);

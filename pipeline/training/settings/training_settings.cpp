@@ -52,9 +52,8 @@ const Settings<TrainingConfig>& training_settings() {
            enum_word<TrainingConfig, LossVariant>(&TrainingConfig::loss_variant, &model::settings::to_string,
                                                   &model::settings::loss_variant_from_string),
        .description =
-           "`official` reproduces two faults of the released code: gradients are NaN if a predicted "
-           "joint is not rotated at all, and samples without truth are shown to the discriminator as "
-           "real animals",
+           "`official` reproduces two faults of the released code: gradients are NaN if a predicted joint is "
+           "not rotated at all, and samples without truth are shown to the discriminator as real animals",
        .words = model::settings::loss_variant_names(),
        .decides = DecidedStage::weights},
       {.key = "backbone_rate",
@@ -74,9 +73,8 @@ const Settings<TrainingConfig>& training_settings() {
       {.key = "frozen_stem_blocks",
        .member = &TrainingConfig::frozen_stem_blocks,
        .description = "the first convolution and so many of the 11 blocks of an EfficientNet stem keep their "
-                      "values. The "
-                      "first blocks see the most pixels, so freezing them saves much of a step's time; 0 "
-                      "freezes nothing",
+                      "values. The first blocks see the most pixels, so freezing them saves much of a step's "
+                      "time; 0 freezes nothing",
        .range = {.least = 0, .most = kMostStemBlocks},
        .decides = DecidedStage::weights},
       {.key = "weight_decay",
@@ -132,8 +130,7 @@ const Settings<TrainingNetworkConfig>& training_network_settings() {
        .member = &Config::without,
        .description =
            "the paper's ablations: `bio_features` (no F_bio: the bio encoder starts from random weights and "
-           "is "
-           "trained along with the rest), `initial_betas` (no beta_init: betas start from zero), "
+           "is trained along with the rest), `initial_betas` (no beta_init: betas start from zero), "
            "`keypoint_tokens` (neither keypoint tokens nor auxiliary keypoints). The trained checkpoint "
            "records them",
        .words = {"bio_features", "initial_betas", "keypoint_tokens"},
@@ -158,9 +155,8 @@ const Settings<TrainingNetworkConfig>& training_network_settings() {
            "number type of the forward pass's matrix products. `bfloat16` uses LibTorch's autocast; weights, "
            "losses, body model and optimiser stay in float32. On x86 it is faster only if the processor "
            "multiplies in bfloat16 (AVX512_BF16). Without AVX-512, LibTorch's bfloat16 convolutions are "
-           "about "
-           "ten times slower than float32, and a warning says so. `auto` takes bfloat16 on a GPU or such a "
-           "processor, else float32",
+           "about ten times slower than float32, and a warning says so. `auto` takes bfloat16 on a GPU or "
+           "such a processor, else float32",
        .words = texts(precision_names()),
        .decides = DecidedStage::weights},
       {.key = "compute_threads",
