@@ -1,4 +1,4 @@
-# The shared compile options, the precompiled LibTorch header and the helpers that declare our targets.
+# The shared compile options, the precompiled headers and the helpers that declare our targets.
 
 add_library(q3d_options INTERFACE)
 target_compile_options(q3d_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow -fPIC
@@ -20,7 +20,7 @@ if(Q3D_LIBTORCH)
 endif()
 
 # q3d_precompiled_header(NAME LIBS libs HEADERS headers): the library NAME carries a precompiled header, which targets
-# with the same options take over by REUSE_FROM.
+# with the same options reuse by REUSE_FROM.
 function(q3d_precompiled_header name)
   cmake_parse_arguments(ARG "" "" "LIBS;HEADERS" ${ARGN})
   add_library(${name} STATIC "${PROJECT_SOURCE_DIR}/cmake/precompiled_header.cpp")

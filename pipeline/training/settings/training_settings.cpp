@@ -67,7 +67,7 @@ const Settings<TrainingConfig>& training_settings() {
        .member = &TrainingConfig::stem_rate,
        .description =
            "learning rate of a pre-trained EfficientNet stem as a share of the rate of the encoder that it "
-           "belongs to, in all phases. What knows pictures already needs small steps",
+           "belongs to, in all phases. Weights that know pictures already need small steps",
        .range = kNotNegative,
        .decides = DecidedStage::weights},
       {.key = "frozen_stem_blocks",
