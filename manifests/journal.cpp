@@ -61,7 +61,7 @@ Journal::Journal(std::filesystem::path file) : file_(std::move(file)) {
       const std::int64_t unit = entry->unit;
       entries_.insert_or_assign(unit, std::move(*entry));
     } else if (next == content.size()) {
-      dropped_torn_line_ = true;
+      dropped_torn_line_ = true;  // the last line, which a killed writer did not finish
     } else {
       damaged_lines_.push_back(line_number);
     }

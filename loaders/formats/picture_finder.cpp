@@ -71,6 +71,8 @@ FoundPicture PictureFinder::find(const std::string& name) {
   const std::vector<NameReading> readings = readings_of(name);
   if (readings.empty()) return {{}, Reason::image_missing, fmt::format("\"{}\", which names no file", name)};
   for (std::size_t i = 0; i < readings.size(); ++i) {
+    // find_exactly() counts a name that leads to the file by "../" or the root's own name. Such a picture
+    // must not be counted again because its reading is not the first.
     const std::size_t counted = found_by_reading_;
     auto found = find_exactly(readings[i]);
     if (!found) continue;

@@ -87,15 +87,18 @@ std::optional<PictureHeader> read_jpeg_header(const ReadAt& read_at) {
       ++at;
       continue;
     }
+    // Markers that stand alone: TEM, the restarts and the start of the image.
     const bool has_no_length = kind == 0x01 || (kind >= 0xd0 && kind <= 0xd8);
     if (has_no_length) {
       at += 2;
       continue;
     }
+    // The end of the image, or the start of a scan.
     const bool are_pixels_next = kind == 0xd9 || kind == 0xda;
     if (are_pixels_next) return std::nullopt;
     const std::uint32_t length = big_endian(std::span(marker).subspan(2));
     if (length < 2) return std::nullopt;
+    // The 13 kinds of frames. The gaps between their numbers are DHT, JPG and DAC.
     const bool is_frame = kind >= 0xc0 && kind <= 0xcf && kind != 0xc4 && kind != 0xc8 && kind != 0xcc;
     if (is_frame) {
       std::array<std::byte, 5> frame{};  // bits of a sample, height, width

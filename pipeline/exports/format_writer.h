@@ -60,7 +60,4 @@ struct ExportedDataset {
 std::unique_ptr<FormatWriter> make_prima_writer(ExportedDataset dataset);
 std::unique_ptr<FormatWriter> make_coco_writer(ExportedDataset dataset);
 
-// A name that can be part of a path: every other character is replaced by "-".
-std::string path_part(const std::string& name);
-
 }  // namespace q3d::pipeline::exports

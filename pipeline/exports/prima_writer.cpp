@@ -18,6 +18,17 @@ std::string blank_mask(int side_px) {
   return fmt::format("masks/none_{}.png", side_px);
 }
 
+// Returns a name that can be part of a path: every character that could not is replaced by "-".
+std::string path_part(const std::string& name) {
+  std::string part = name;
+  for (char& c : part) {
+    const bool is_plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                          c == '-' || c == '_' || (c == '.' && &c != part.data());
+    if (!is_plain) c = '-';
+  }
+  return part;
+}
+
 std::string folder_of(const manifests::ShardSample& sample) {
   return path_part(sample.record.dataset);
 }
@@ -50,6 +61,8 @@ class PrimaWriter final : public FormatWriter {
     return {{folder + names.image, &exported.picture.bytes}};
   }
 
+  // A line has three parts with tabs between them: "dataset/split", the side of the blank mask that the
+  // record names (empty if it names none), and the record's JSON. take() reads these lines.
   std::string lines(const ExportedSample& exported) const override {
     const PictureNames names = exported.picture.bytes.empty()
                                    ? PictureNames{exported.sample.record.image_ref, {}}
@@ -115,16 +128,6 @@ class PrimaWriter final : public FormatWriter {
 
 std::unique_ptr<FormatWriter> make_prima_writer(ExportedDataset dataset) {
   return std::make_unique<PrimaWriter>(std::move(dataset));
-}
-
-std::string path_part(const std::string& name) {
-  std::string part = name;
-  for (char& c : part) {
-    const bool is_plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-                          c == '-' || c == '_' || (c == '.' && &c != part.data());
-    if (!is_plain) c = '-';
-  }
-  return part;
 }
 
 }  // namespace q3d::pipeline::exports

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "filters/trust.h"
+#include "manifests/enumerators.h"
 #include "pipeline/unit/crop_keypoints.h"
 
 namespace q3d::pipeline::unit {
@@ -74,10 +75,10 @@ manifests::Judgement judge_refined(const device::CropKeypoints& keypoints, doubl
   }
   const bool holds_out = guards.held_out_share > 0.0;
   const bool is_retained = filters::band(error, thresholds) == filters::Band::retain;
-  // With a single visible keypoint nothing could be held out.
+  // A sample with a single visible keypoint cannot hold one out.
   if (holds_out && refined.held_out_curve.empty() && !is_retained) return nothing_to_hold_out(refined);
   manifests::Judgement judgement;
-  if (is_retained) {
+  if (is_retained) {  // it was adapted all the same, by tta.refine_retained
     const bool has_held_out = !refined.held_out_curve.empty();
     judgement = filters::judge_retained(refined.curve, has_held_out ? refined.held_out_curve : refined.curve,
                                         thresholds);
@@ -86,6 +87,7 @@ manifests::Judgement judge_refined(const device::CropKeypoints& keypoints, doubl
   } else {
     judgement = filters::judge_adapted(refined.curve, thresholds);
   }
+  // The guard iterations_full_at has shortened the adaptation of a sample with few visible keypoints.
   const int visible = visible_keypoints(keypoints);
   if (visible >= guards.iterations_full_at) return judgement;
   const int unscaled = filters::adaptation_schedule(error, thresholds).iterations;
@@ -127,7 +129,7 @@ void judge_unit(UnitWork& work, const config::JudgingRules& rules) {
 }
 
 bool is_kept(const manifests::Judgement& judgement) {
-  return judgement.verdict == Verdict::retained || judgement.verdict == Verdict::refined;
+  return manifests::is_kept(judgement.verdict);
 }
 
 }  // namespace q3d::pipeline::unit
