@@ -40,6 +40,8 @@ class Handle {
   }
   Handle(Handle&& other) noexcept : id_(std::exchange(other.id_, -1)), close_(other.close_) {}
   Handle& operator=(Handle&&) = delete;
+  Handle(const Handle&) = delete;
+  Handle& operator=(const Handle&) = delete;
   hid_t get() const { return id_; }
   // Closes now. Throws like throw_error() if this fails, which for a file means that it is incomplete.
   void close(const std::string& what) { check(close_(std::exchange(id_, -1)), what); }

@@ -20,6 +20,7 @@ std::vector<std::string> variable_texts(hid_t dataset, hid_t space, std::uint64_
   std::vector<char*> pointers(count, nullptr);
   check(H5Dread(dataset, type.get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, pointers.data()), name);
   std::vector<std::string> texts;
+  texts.reserve(pointers.size());
   for (const char* pointer : pointers) texts.emplace_back(pointer == nullptr ? "" : pointer);
   check(H5Dvlen_reclaim(type.get(), space, H5P_DEFAULT, pointers.data()), name);
   return texts;
