@@ -16,8 +16,9 @@ int main(int argc, char** argv) {
   if (words.size() > command && cli::needs_network(words.subspan(command))) {
     return cli::become_network_program(argv);
   }
-  constexpr std::array<cli::CommandEntry, 12> kEntries{{
+  constexpr std::array<cli::CommandEntry, 13> kEntries{{
       {"verify", cli::add_verify},
+      {"status", cli::add_status},
       {"inspect", cli::add_inspect},
       {"config", cli::add_config},
       {"explain", cli::add_explain},

@@ -14,6 +14,7 @@
 #include "manifests/shard.h"
 #include "pipeline/config/build_settings.h"
 #include "pipeline/run/log.h"
+#include "pipeline/stages/stage.h"
 
 namespace q3d::pipeline::stages {
 namespace {
@@ -29,13 +30,14 @@ constexpr int kMeasureCode = 2;
 constexpr int kCropsCode = 1;
 constexpr int kShardsCode = 2;
 
-std::string key_of(const char* stage, int code, json parts) {
+// The text whose SHA-256 is the stage's key. nlohmann sorts the keys, so it is canonical.
+std::string key_text(const char* stage, int code, json parts) {
   parts["stage"] = stage;
   parts["code"] = code;
-  return manifests::sha256(parts.dump());  // nlohmann sorts the keys, so the text is canonical
+  return parts.dump();
 }
 
-std::string ingest_key(const config::BuildConfig& config, const candidates::Ingest& ingest) {
+std::string ingest_text(const config::BuildConfig& config, const candidates::Ingest& ingest) {
   json datasets = json::array();
   for (const auto& dataset : config.datasets) {
     const std::string name = dataset.name + "/" + dataset.split;
@@ -44,7 +46,7 @@ std::string ingest_key(const config::BuildConfig& config, const candidates::Inge
   }
   json units = json::array();
   for (const candidates::Unit& unit : ingest.units) units.push_back(unit.label_digest);
-  return key_of("ingest", kIngestCode, {{"datasets", datasets}, {"units", units}});
+  return key_text("ingest", kIngestCode, {{"datasets", datasets}, {"units", units}});
 }
 
 bool are_equal(const filters::Thresholds& a, const filters::Thresholds& b) {
@@ -103,6 +105,35 @@ std::optional<std::string> key_in(const std::string& text) {
   return is_key ? std::optional(std::move(key)) : std::nullopt;
 }
 
+std::string predict_text(const config::BuildConfig& config, const AssetDigests& assets,
+                         const std::string& device_key) {
+  if (!config::needs_network(config)) {
+    return key_text("predict", kPredictCode, {{"network", nullptr}, {"unit_size", config.shards.unit_size}});
+  }
+  json parts = config::key_parts(config::network_settings(), config.network, config::DecidedStage::predict);
+  parts.update(config::key_parts(config::shard_settings(), config.shards, config::DecidedStage::predict));
+  parts.update(
+      {{"checkpoint", assets.checkpoint}, {"smal_asset", assets.smal_asset}, {"device", device_key}});
+  return key_text("predict", kPredictCode, std::move(parts));
+}
+
+std::string crops_text(const config::ShardConfig& shards) {
+  json parts = {{"images", manifests::to_string(shards.images)},
+                {"crop_scale", shards.crop_scale},
+                {"crop_min_side_px", shards.crop_min_side_px},
+                {"unit_size", shards.unit_size}};
+  if (shards.images == manifests::ImageEncoding::jpeg) parts["jpeg_quality"] = shards.jpeg_quality;
+  return key_text("crops", kCropsCode, std::move(parts));
+}
+
+// Sets the stage's key and what it is made from.
+const std::string& set_key(StageKeys& keys, Stage stage, std::string text) {
+  std::string& key = key_of(keys, stage);
+  key = manifests::sha256(text);
+  keys.made_from[std::string(to_string(stage))] = std::move(text);
+  return key;
+}
+
 }  // namespace
 
 AssetDigests digest_assets(const config::BuildConfig& config, manifests::DigestCache& digests) {
@@ -118,47 +149,36 @@ AssetDigests digest_assets(const config::BuildConfig& config, manifests::DigestC
 
 std::string predict_key(const config::BuildConfig& config, const AssetDigests& assets,
                         const std::string& device_key) {
-  if (!config::needs_network(config)) {
-    return key_of("predict", kPredictCode, {{"network", nullptr}, {"unit_size", config.shards.unit_size}});
-  }
-  json parts = config::key_parts(config::network_settings(), config.network, config::DecidedStage::predict);
-  parts.update(config::key_parts(config::shard_settings(), config.shards, config::DecidedStage::predict));
-  parts.update(
-      {{"checkpoint", assets.checkpoint}, {"smal_asset", assets.smal_asset}, {"device", device_key}});
-  return key_of("predict", kPredictCode, std::move(parts));
+  return manifests::sha256(predict_text(config, assets, device_key));
 }
 
 std::string crops_key(const config::ShardConfig& shards) {
-  json parts = {{"images", manifests::to_string(shards.images)},
-                {"crop_scale", shards.crop_scale},
-                {"crop_min_side_px", shards.crop_min_side_px},
-                {"unit_size", shards.unit_size}};
-  if (shards.images == manifests::ImageEncoding::jpeg) parts["jpeg_quality"] = shards.jpeg_quality;
-  return key_of("crops", kCropsCode, std::move(parts));
+  return manifests::sha256(crops_text(shards));
 }
 
 StageKeys keys_of_config(const config::BuildConfig& config, const config::JudgingRules& rules,
                          const AssetDigests& assets, const std::string& device_key) {
   StageKeys keys;
-  keys.predict = predict_key(config, assets, device_key);
+  set_key(keys, Stage::predict, predict_text(config, assets, device_key));
   const bool judges = config::needs_network(config);
   json fidelity = judges ? fidelity_parts(rules) : json::object();
   fidelity["predict"] = keys.predict;
-  keys.fidelity = key_of("fidelity", kFidelityCode, std::move(fidelity));
+  set_key(keys, Stage::fidelity, key_text("fidelity", kFidelityCode, std::move(fidelity)));
   json refine = judges ? refine_parts(config.tta, config.guards) : json::object();
   refine["fidelity"] = keys.fidelity;
   if (config::uses_priors(config.tta)) refine["priors"] = assets.priors;
-  keys.refine = key_of("refine", kRefineCode, std::move(refine));
+  set_key(keys, Stage::refine, key_text("refine", kRefineCode, std::move(refine)));
   json shards = config::key_parts(config::shard_settings(), config.shards, config::DecidedStage::shards);
   shards.update({{"refine", keys.refine}, {"schema", manifests::kShardSchema}, {"name", config.name}});
   if (judges) {
-    keys.measure = key_of("measure", kMeasureCode, {{"refine", keys.refine}, {"priors", assets.priors}});
-    shards["measure"] = keys.measure;
+    shards["measure"] =
+        set_key(keys, Stage::measure,
+                key_text("measure", kMeasureCode, {{"refine", keys.refine}, {"priors", assets.priors}}));
     shards["bounds"] = bounds_json(config.guards);
     shards["trust"] = {{"version", filters::kTrustVersion}, {"least", rules.min_trust}};
   }
-  keys.crops = crops_key(config.shards);
-  keys.shards = key_of("shards", kShardsCode, std::move(shards));
+  set_key(keys, Stage::crops, crops_text(config.shards));
+  set_key(keys, Stage::shards, key_text("shards", kShardsCode, std::move(shards)));
   return keys;
 }
 
@@ -166,9 +186,9 @@ StageKeys stage_keys(const config::BuildConfig& config, const config::JudgingRul
                      const candidates::Ingest& ingest, const AssetDigests& assets,
                      const std::string& device_key) {
   StageKeys keys = keys_of_config(config, rules, assets, device_key);
-  keys.ingest = ingest_key(config, ingest);
-  keys.dataset =
-      key_of("dataset", 1, {{"ingest", keys.ingest}, {"shards", keys.shards}, {"version", config.version}});
+  set_key(keys, Stage::ingest, ingest_text(config, ingest));
+  keys.dataset = manifests::sha256(key_text(
+      "dataset", 1, {{"ingest", keys.ingest}, {"shards", keys.shards}, {"version", config.version}}));
   return keys;
 }
 

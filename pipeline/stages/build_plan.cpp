@@ -1,0 +1,132 @@
+#include "pipeline/stages/build_plan.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <utility>
+
+#include "manifests/atomic_file.h"
+#include "pipeline/run/log.h"
+#include "pipeline/stages/stage.h"
+
+namespace q3d::pipeline::stages {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+using nlohmann::ordered_json;
+
+constexpr const char* kFormat = "quadruped3d-build-plan";
+
+fs::path plans_folder(const fs::path& out) {
+  return out / "stages" / "builds";
+}
+
+ordered_json stages_json(const StageKeys& keys) {
+  ordered_json stages = ordered_json::object();
+  for (const Stage stage : kStages) {
+    const std::string name(to_string(stage));
+    const std::string& key = key_of(keys, stage);
+    if (key.empty()) continue;
+    stages[name] = {{"key", key}, {"made_from", ordered_json::parse(keys.made_from.at(name))}};
+  }
+  return stages;
+}
+
+std::string text_of(const BuildPlan& plan) {
+  ordered_json units = ordered_json::array();
+  for (const PlannedUnit& unit : plan.units) {
+    units.push_back({{"input", unit.input_digest}, {"labels", unit.label_digest}});
+  }
+  const ordered_json document = {{"format", kFormat},
+                                 {"name", plan.name},
+                                 {"key", plan.keys.dataset},
+                                 {"candidates", plan.candidates},
+                                 {"command", plan.command},
+                                 {"stages", stages_json(plan.keys)},
+                                 {"units", units}};
+  return document.dump(2) + "\n";
+}
+
+// Throws json::exception when something is missing or of another type.
+BuildPlan plan_from(const json& document) {
+  BuildPlan plan;
+  plan.name = document.at("name").get<std::string>();
+  plan.keys.dataset = document.at("key").get<std::string>();
+  plan.candidates = document.at("candidates").get<std::int64_t>();
+  plan.command = document.at("command").get<std::vector<std::string>>();
+  for (const Stage stage : kStages) {
+    const std::string name(to_string(stage));
+    const auto found = document.at("stages").find(name);
+    if (found == document.at("stages").end()) continue;
+    key_of(plan.keys, stage) = found->at("key").get<std::string>();
+    plan.keys.made_from[name] = found->at("made_from").dump();
+  }
+  for (const json& unit : document.at("units")) {
+    plan.units.push_back({unit.at("input").get<std::string>(), unit.at("labels").get<std::string>()});
+  }
+  return plan;
+}
+
+std::optional<BuildPlan> read_plan(const fs::path& file) {
+  const json document = json::parse(manifests::read_file(file), nullptr, /*allow_exceptions=*/false);
+  std::string problem = "it is not readable JSON";
+  if (document.is_object() && document.value("format", json()) == kFormat) {
+    try {
+      return plan_from(document);
+    } catch (const json::exception& error) {
+      problem = error.what();
+    }
+  }
+  run::log_warning(
+      fmt::format("{}: damaged: {}; the next run of its build writes it anew", file.string(), problem));
+  return std::nullopt;
+}
+
+}  // namespace
+
+std::string version_name(const std::string& name, const StageKeys& keys) {
+  return name + "-" + keys.dataset.substr(0, kShortKey);
+}
+
+BuildPlan plan_of(const std::string& name, const candidates::Ingest& ingest, StageKeys keys,
+                  std::vector<std::string> command) {
+  BuildPlan plan{
+      name, static_cast<std::int64_t>(ingest.candidates.size()), {}, std::move(keys), std::move(command)};
+  for (const candidates::Unit& unit : ingest.units) {
+    plan.units.push_back({unit.input_digest, unit.label_digest});
+  }
+  return plan;
+}
+
+fs::path plan_file(const fs::path& out, const std::string& version) {
+  return plans_folder(out) / (version + ".json");
+}
+
+void write_build_plan(const fs::path& out, const BuildPlan& plan) {
+  const fs::path file = plan_file(out, version_name(plan.name, plan.keys));
+  const std::string text = text_of(plan);
+  if (fs::exists(file) && manifests::read_file(file) == text) return;
+  fs::create_directories(file.parent_path());
+  manifests::remove_temporaries(file.parent_path());
+  manifests::write_file_atomically(file, text);
+}
+
+std::vector<BuildPlan> read_build_plans(const fs::path& out) {
+  std::vector<fs::path> files;
+  if (fs::exists(plans_folder(out))) {
+    for (const auto& entry : fs::directory_iterator(plans_folder(out))) {
+      if (entry.path().extension() == ".json") files.push_back(entry.path());
+    }
+  }
+  std::sort(files.begin(), files.end());
+  std::vector<BuildPlan> plans;
+  for (const fs::path& file : files) {
+    if (auto plan = read_plan(file)) plans.push_back(std::move(*plan));
+  }
+  return plans;
+}
+
+}  // namespace q3d::pipeline::stages

@@ -1,0 +1,49 @@
+// What a build is going to make: its units and the keys of its stages.
+//
+// A build writes its plan as soon as the candidates are read, to <out>/stages/builds/<name>-<key>.json. With it,
+// others can say how far the build has come (`status`), and why a later build makes a stage anew
+// (`build --dry-run`). No result depends on a plan, and it is no part of a dataset.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pipeline/candidates/ingest.h"
+#include "pipeline/stages/stages.h"
+
+namespace q3d::pipeline::stages {
+
+// The digests of a unit, as candidates::Unit has them.
+struct PlannedUnit {
+  std::string input_digest;
+  std::string label_digest;
+};
+
+struct BuildPlan {
+  std::string name;  // of the dataset
+  std::int64_t candidates = 0;
+  std::vector<PlannedUnit> units;
+  StageKeys keys;
+  std::vector<std::string> command;  // the words after the program's name, as the user gave them; may be empty
+};
+
+// "<name>-<first 12 hex digits of the dataset's key>": the name of a version's folder.
+std::string version_name(const std::string& name, const StageKeys& keys);
+
+BuildPlan plan_of(const std::string& name, const candidates::Ingest& ingest, StageKeys keys,
+                  std::vector<std::string> command);
+
+// Where the plan of a version lies.
+std::filesystem::path plan_file(const std::filesystem::path& out, const std::string& version);
+
+// Writes the plan, unless its file holds it already. Throws manifests::IoError.
+void write_build_plan(const std::filesystem::path& out, const BuildPlan& plan);
+
+// All plans in an output folder, in the order of their files' names. A file that holds no plan is left out,
+// and a warning names it. Throws manifests::IoError.
+std::vector<BuildPlan> read_build_plans(const std::filesystem::path& out);
+
+}  // namespace q3d::pipeline::stages

@@ -1,0 +1,21 @@
+// The status of an output folder as text and as JSON.
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include <string>
+
+#include "pipeline/status/folder_status.h"
+
+namespace q3d::pipeline::status {
+
+// A table of the build's stages, a line each, with what is missing. Every line begins with `indent`.
+std::string stage_table(const BuildStatus& build, const std::string& indent);
+
+// The whole folder, for people.
+std::string page(const FolderStatus& status);
+
+nlohmann::ordered_json to_json(const BuildStatus& build);
+nlohmann::ordered_json to_json(const FolderStatus& status);
+
+}  // namespace q3d::pipeline::status
