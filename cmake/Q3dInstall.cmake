@@ -6,6 +6,7 @@
 # PREFIX/lib, include/quadruped3d        the rooms that need no LibTorch, for other projects
 # PREFIX/lib/cmake/quadruped3d           find_package(quadruped3d)
 # PREFIX/share/quadruped3d               configs, the small network, licences
+# PREFIX/share/man, bash-completion, zsh/site-functions, fish/vendor_completions.d
 #
 # No file of it holds a path of the machine that built it.
 include(GNUInstallDirs)
@@ -38,6 +39,25 @@ function(q3d_install_programs)
           DESTINATION ${CMAKE_INSTALL_DATADIR}/quadruped3d)
 endfunction()
 
+# What the program prints about its own commands is installed as a file: q3d_install_output(FOLDER FILE WORDS...).
+# It is printed when the project is installed, because the program may be built later than CMake configures.
+function(q3d_install_output folder file)
+  set(made "${PROJECT_BINARY_DIR}/installed/${file}")
+  string(JOIN " " words ${ARGN})
+  install(CODE "
+    file(MAKE_DIRECTORY \"${PROJECT_BINARY_DIR}/installed\")
+    execute_process(COMMAND \"$<TARGET_FILE:quadruped3d>\" ${words} OUTPUT_FILE \"${made}\" COMMAND_ERROR_IS_FATAL ANY)
+    file(INSTALL \"${made}\" DESTINATION \"\${CMAKE_INSTALL_PREFIX}/${folder}\")")
+endfunction()
+
+function(q3d_install_completions)
+  set(share "${CMAKE_INSTALL_DATADIR}")
+  q3d_install_output("${share}/bash-completion/completions" quadruped3d completion bash)
+  q3d_install_output("${share}/zsh/site-functions" _quadruped3d completion zsh)
+  q3d_install_output("${share}/fish/vendor_completions.d" quadruped3d.fish completion fish)
+  q3d_install_output("${CMAKE_INSTALL_MANDIR}/man1" quadruped3d.1 man)
+endfunction()
+
 function(q3d_install_package)
   set(folder "${CMAKE_INSTALL_LIBDIR}/cmake/quadruped3d")
   install(EXPORT quadruped3dTargets NAMESPACE quadruped3d:: DESTINATION ${folder})
@@ -50,6 +70,7 @@ function(q3d_install_package)
           DESTINATION ${folder})
   if(PROJECT_IS_TOP_LEVEL)
     q3d_install_programs()
+    q3d_install_completions()
     set(CPACK_GENERATOR DEB)
     set(CPACK_PACKAGE_CONTACT "the quadruped3d contributors")
     set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "Builds 3D datasets of quadrupeds from photographs with 2D keypoints")

@@ -15,6 +15,7 @@
 #include "filters/metrics.h"
 #include "loaders/pictures/crop.h"
 #include "manifests/atomic_file.h"
+#include "pipeline/build/prediction_progress.h"
 #include "pipeline/build/quality.h"
 #include "pipeline/build/workspace.h"
 #include "pipeline/run/errors.h"
@@ -50,6 +51,7 @@ std::vector<Scored> predict_pool(const config::BuildConfig& config, Workspace& w
                                  stages::predict_key(config, workspace.assets(), workspace.device_key()));
   std::vector<Scored> scored;
   run::Progress progress("predicted", static_cast<std::int64_t>(ingest.candidates.size()), workspace.quiet());
+  PredictionProgress predicted(progress);
   unit::UnitFlow flow;
   flow.units = static_cast<std::int64_t>(ingest.units.size());
   flow.read = [&](std::int64_t index) {
@@ -61,7 +63,10 @@ std::vector<Scored> predict_pool(const config::BuildConfig& config, Workspace& w
   };
   flow.decode = [&](unit::UnitWork& work) { unit::decode_unit(work, config.shards, nullptr); };
   flow.compute = [&](unit::UnitWork& work) {
-    if (!work.predicted) unit::predict_unit(work, [&]() -> device::Network& { return workspace.network(); });
+    if (work.predicted) return;
+    unit::predict_unit(work, [&]() -> device::Network& { return workspace.network(); },
+                       {&predicted, static_cast<std::size_t>(config.network.batch)});
+    predicted.tell();
   };
   flow.write = [&](unit::UnitWork& work) {
     if (!work.predicted_before)
@@ -74,7 +79,7 @@ std::vector<Scored> predict_pool(const config::BuildConfig& config, Workspace& w
                                     loaders::pictures::kPatchSidePx);
       scored.push_back({&candidate, {work.errors[i], 100.0 * auc.value()}});
     }
-    progress.advance(static_cast<std::int64_t>(work.unit->count), work.predicted_before);
+    if (work.predicted_before) progress.advance(static_cast<std::int64_t>(work.unit->count), true);
   };
   unit::run_units(flow, workspace.device());
   return scored;

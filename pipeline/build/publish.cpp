@@ -8,6 +8,7 @@
 #include "manifests/atomic_file.h"
 #include "manifests/link_file.h"
 #include "pipeline/run/log.h"
+#include "pipeline/stages/build_plan.h"
 
 namespace q3d::pipeline::build {
 namespace {
@@ -51,7 +52,7 @@ void check_sums(const candidates::Ingest& ingest, const std::vector<manifests::J
 
 fs::path version_folder(const fs::path& out, const config::BuildConfig& config,
                         const stages::StageKeys& keys) {
-  return out / (config.name + "-" + keys.dataset.substr(0, stages::kShortKey));
+  return out / stages::version_name(config.name, keys);
 }
 
 bool is_published(const fs::path& folder, const stages::StageKeys& keys, manifests::DigestCache& digests) {

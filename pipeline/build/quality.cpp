@@ -80,6 +80,16 @@ void require_below_ceiling(const std::string& dataset, double tau_high, double t
       dataset.empty() ? "" : fmt::format(" of the dataset {}", dataset), tau_high, tau_ceiling));
 }
 
+config::JudgingRules checked_rules(const config::BuildConfig& config, bool above_ceiling) {
+  config::require_keypoints(config);
+  config::JudgingRules rules = config::judging_rules(config);
+  if (above_ceiling) return rules;
+  for (const auto& [name, thresholds] : rules.thresholds) {
+    require_below_ceiling(name, thresholds.tau_high, config.filter.tau_ceiling);
+  }
+  return rules;
+}
+
 void require_labels(const dataset::DatasetManifest& manifest, const std::filesystem::path& folder) {
   const dataset::Counts& counts = manifest.counts;
   if (counts.retained + counts.refined > 0) return;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "pipeline/config/build_config.h"
+#include "pipeline/config/judging_rules.h"
 #include "pipeline/dataset/dataset_manifest.h"
 #include "pipeline/dataset/warnings.h"
 #include "pipeline/device/domain.h"
@@ -35,6 +36,10 @@ std::vector<dataset::Warning> quality_warnings(const std::vector<PoolErrors>& po
 // Throws std::runtime_error that names dataset, tau_high and ceiling, and says what to do, for the first of
 // the thresholds above the ceiling.
 void require_below_ceiling(const std::string& dataset, double tau_high, double tau_ceiling);
+
+// The rules of a build, after all checks that need nothing but its config. Throws ConfigError, and as
+// require_below_ceiling unless `above_ceiling`.
+config::JudgingRules checked_rules(const config::BuildConfig& config, bool above_ceiling);
 
 // Throws std::runtime_error that says why, if the dataset in `folder` has no label.
 void require_labels(const dataset::DatasetManifest& manifest, const std::filesystem::path& folder);

@@ -23,6 +23,11 @@ std::filesystem::path made(const std::filesystem::path& folder) {
   return folder;
 }
 
+std::optional<manifests::FolderLock> locked(const std::filesystem::path& folder, Workspace::Use use) {
+  if (use == Workspace::Use::look) return std::nullopt;
+  return std::optional<manifests::FolderLock>(std::in_place, made(folder));
+}
+
 Origins read_origins(const config::BuildConfig& config) {
   if (!config::needs_network(config)) return {};
   return {network::read_domain(config.network.checkpoint),
@@ -36,17 +41,18 @@ std::size_t flow_threads(int wanted) {
   return std::max<std::size_t>(1, std::thread::hardware_concurrency());
 }
 
-Workspace::Workspace(const config::BuildConfig& config, const run::RunOptions& options)
+Workspace::Workspace(const config::BuildConfig& config, const run::RunOptions& options, Use use)
     : config_(config),
       options_(options),
       threads_(tbb::global_control::max_allowed_parallelism, flow_threads(options.threads)),
-      lock_(made(options.out)),
-      digests_(options.out / "digests.txt"),
+      lock_(locked(options.out, use)),
+      scratch_(use == Use::look ? std::optional<ScratchCopy>(std::in_place, options.out) : std::nullopt),
+      digests_((scratch_ ? scratch_->folder() : options.out) / "digests.txt"),
       assets_(stages::digest_assets(config, digests_)),
       device_key_(config::needs_network(config) ? network::device_key(config.network) : std::string()),
       origins_(read_origins(config)),
       ingest_(candidates::ingest(config, digests_, network::load_body_meshes)) {
-  leakage::leave_out(config, digests_, options.out, options.quiet, ingest_);
+  leakage::leave_out(config, digests_, scratch_ ? scratch_->folder() : options.out, options.quiet, ingest_);
   if (!options_.quiet) {
     run::log_info(fmt::format("{} in {}",
                               run::counted(static_cast<std::int64_t>(ingest_.candidates.size()), "candidate"),

@@ -6,11 +6,13 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "manifests/digest.h"
 #include "manifests/lock.h"
 #include "pipeline/build/quality.h"
+#include "pipeline/build/scratch_copy.h"
 #include "pipeline/candidates/ingest.h"
 #include "pipeline/device/device_worker.h"
 #include "pipeline/device/network.h"
@@ -24,10 +26,16 @@ std::size_t flow_threads(int wanted);
 
 class Workspace {
  public:
+  enum class Use : std::uint8_t {
+    work,  // makes the output folder, holds its lock, keeps what it digests and finds
+    look,  // writes nothing into it; what is digested and found is kept in a scratch folder until the end
+  };
+
   // Takes the folder's lock, digests the assets and ingests the datasets. Throws ConfigError,
   // std::runtime_error, Interrupted.
-  Workspace(const config::BuildConfig& config, const run::RunOptions& options);
+  Workspace(const config::BuildConfig& config, const run::RunOptions& options, Use use = Use::work);
 
+  // Of Use::work.
   const std::filesystem::path& out() const { return options_.out; }
   const candidates::Ingest& ingest() const { return ingest_; }
   const stages::AssetDigests& assets() const { return assets_; }
@@ -48,7 +56,8 @@ class Workspace {
   const config::BuildConfig& config_;
   run::RunOptions options_;
   tbb::global_control threads_;
-  manifests::FolderLock lock_;
+  std::optional<manifests::FolderLock> lock_;
+  std::optional<ScratchCopy> scratch_;  // of Use::look
   manifests::DigestCache digests_;
   stages::AssetDigests assets_;
   std::string device_key_;

@@ -14,11 +14,11 @@ namespace q3d::pipeline::cli {
 
 struct CommandInfo {
   std::string_view name;
-  std::string_view description;       // one line of `quadruped3d --help`
-  bool needs_network;                 // links LibTorch, and is therefore in the program quadruped3d-network
+  std::string_view description;  // one line of `quadruped3d --help`
+  bool needs_network;  // runs in the program quadruped3d-network, which links LibTorch and knows all commands
   std::string_view network_option{};  // with this option, the command runs there too
 };
-inline constexpr std::array<CommandInfo, 25> kCommands{{
+inline constexpr std::array<CommandInfo, 27> kCommands{{
     {"build", "make a versioned dataset of labels from annotated photographs", true},
     {"calibrate", "find the thresholds that give the wanted shares of labels", true},
     {"predict", "give the bodies of animals in photographs, with or without keypoints", true},
@@ -45,6 +45,8 @@ inline constexpr std::array<CommandInfo, 25> kCommands{{
     {"subset", "make a version of the candidates that fulfil a condition", false},
     {"diff", "show which verdicts and labels changed between two versions, and by how much", false},
     {"curate", "choose a balanced subset of a large dataset, by species; build takes the list", false},
+    {"completion", "print a script that completes commands and options in bash, zsh or fish", true},
+    {"man", "print the manual page", true},
 }};
 
 // Declares the command on the application, with its description. Throws std::logic_error for a name that
@@ -81,5 +83,8 @@ Command add_corrections(CLI::App& app);
 Command add_merge(CLI::App& app);
 Command add_subset(CLI::App& app);
 Command add_diff(CLI::App& app);
+// These describe all commands of `app`, which must outlive what they return.
+Command add_completion(CLI::App& app);
+Command add_man(CLI::App& app);
 
 }  // namespace q3d::pipeline::cli

@@ -1,11 +1,11 @@
 // quadruped3d: the program that people start. It runs the commands that need no network itself, so that they
 // start at once; the others run in quadruped3d-network, which links LibTorch.
 
-#include <array>
 #include <span>
 #include <string_view>
 
 #include "pipeline/cli/network_program.h"
+#include "pipeline/cli/plain_commands.h"
 #include "pipeline/cli/program.h"
 
 int main(int argc, char** argv) {
@@ -16,20 +16,5 @@ int main(int argc, char** argv) {
   if (words.size() > command && cli::needs_network(words.subspan(command))) {
     return cli::become_network_program(argv);
   }
-  constexpr std::array<cli::CommandEntry, 13> kEntries{{
-      {"verify", cli::add_verify},
-      {"status", cli::add_status},
-      {"inspect", cli::add_inspect},
-      {"config", cli::add_config},
-      {"explain", cli::add_explain},
-      {"leakage", cli::add_leakage},
-      {"curate", cli::add_curate},
-      {"topology", cli::add_topology},
-      {"export", cli::add_export},
-      {"corrections", cli::add_corrections},
-      {"merge", cli::add_merge},
-      {"subset", cli::add_subset},
-      {"diff", cli::add_diff},
-  }};
-  return cli::run_program(argc, argv, kEntries);
+  return cli::run_program(argc, argv, cli::kPlainCommands);
 }

@@ -1,14 +1,17 @@
-// quadruped3d-network: the commands that need LibTorch. quadruped3d starts it.
+// quadruped3d-network: the commands that need LibTorch, and the completions and the manual page of all
+// commands. quadruped3d starts it.
 
-#include <array>
+#include <vector>
 
 #include "pipeline/cli/network_program.h"
+#include "pipeline/cli/plain_commands.h"
 #include "pipeline/cli/program.h"
 
 int main(int argc, char** argv) {
   namespace cli = q3d::pipeline::cli;
   if (!cli::waiting_is_decided()) return cli::start_again_passively(argv);
-  constexpr std::array<cli::CommandEntry, 13> kEntries{{
+  // `inspect` comes before the plain command of that name, which draws no sheets.
+  std::vector<cli::CommandEntry> entries{
       {"build", cli::add_build},
       {"calibrate", cli::add_calibrate},
       {"predict", cli::add_predict},
@@ -22,6 +25,9 @@ int main(int argc, char** argv) {
       {"compare", cli::add_compare},
       {"evaluate-labels", cli::add_evaluate_labels},
       {"compare-labels", cli::add_compare_labels},
-  }};
-  return cli::run_program(argc, argv, kEntries);
+      {"completion", cli::add_completion},
+      {"man", cli::add_man},
+  };
+  entries.insert(entries.end(), cli::kPlainCommands.begin(), cli::kPlainCommands.end());
+  return cli::run_program(argc, argv, entries);
 }

@@ -33,7 +33,8 @@ Command add_status(CLI::App& app) {
       "  quadruped3d status out --json\n"
       "For each build in the folder, finished or not, it lists the stages with their keys, their manifests,\n"
       "the units that are finished and those that are missing, and the command that goes on. It changes\n"
-      "nothing, and may be used while a build runs. It looks at the files' sizes; `quadruped3d verify` reads\n"
+      "nothing, and may be used while a build runs. It looks at the files' sizes; `quadruped3d verify` "
+      "reads\n"
       "a finished dataset whole.");
   return [arguments] {
     const status::FolderStatus found = status::folder_status(arguments->out);

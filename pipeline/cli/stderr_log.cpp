@@ -1,9 +1,10 @@
 #include "pipeline/cli/stderr_log.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <cstdio>
+
+#include "pipeline/run/terminal.h"
 
 namespace q3d::pipeline::cli {
 namespace {
@@ -22,7 +23,7 @@ std::string_view prefix(run::LogLevel level) {
 
 }  // namespace
 
-StderrLog::StderrLog() : terminal_(isatty(STDERR_FILENO) != 0) {}
+StderrLog::StderrLog() : terminal_(run::terminal_of_stderr().redraws) {}
 
 void StderrLog::write(run::LogLevel level, std::string_view line) {
   fmt::print(stderr, "{}{}{}\n", terminal_ ? "\r\033[K" : "", prefix(level), line);

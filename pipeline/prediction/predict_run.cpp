@@ -10,6 +10,7 @@
 #include <memory>
 
 #include "manifests/digest.h"
+#include "pipeline/build/prediction_progress.h"
 #include "pipeline/build/workspace.h"
 #include "pipeline/config/build_settings.h"
 #include "pipeline/run/errors.h"
@@ -110,7 +111,10 @@ class Predictor {
 
   void compute(unit::UnitWork& work) {
     if (!work.predicted) {
-      unit::predict_unit(work, [this]() -> device::Network& { return workspace_.network(); });
+      unit::predict_unit(
+          work, [this]() -> device::Network& { return workspace_.network(); },
+          {adaptations_ ? nullptr : &predicted_, static_cast<std::size_t>(config_.network.batch)});
+      predicted_.tell();
     }
     if (adaptations_ && !work.refined) work.refined = adapt(work);
   }
@@ -155,7 +159,10 @@ class Predictor {
       for (const unit::RefinedSample& refined : *work.refined)
         take(refined, animals_[first + refined.sample]);
     }
-    progress_.advance(static_cast<std::int64_t>(work.unit->count), work.predicted_before);
+    // Adaptation takes most of the time, so with it a unit counts when it is through.
+    if (work.predicted_before || adaptations_) {
+      progress_.advance(static_cast<std::int64_t>(work.unit->count), work.predicted_before);
+    }
   }
 
   static void take(const unit::RefinedSample& refined, PredictedAnimal& animal) {
@@ -172,6 +179,7 @@ class Predictor {
   stages::StageStore predictions_;
   std::unique_ptr<stages::StageStore> adaptations_;  // null without adaptation
   run::Progress progress_;
+  build::PredictionProgress predicted_{progress_};
   std::vector<PredictedAnimal> animals_;
 };
 

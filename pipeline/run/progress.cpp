@@ -1,54 +1,70 @@
 #include "pipeline/run/progress.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
-#include <cmath>
 #include <cstdio>
+#include <utility>
+
+#include "pipeline/run/terminal.h"
 
 namespace q3d::pipeline::run {
+namespace {
 
-std::string human_duration(double seconds) {
-  const auto whole = static_cast<std::int64_t>(std::llround(seconds));
-  if (whole < 60) return fmt::format("{} s", whole);
-  if (whole < 3600) return fmt::format("{} min {:02} s", whole / 60, whole % 60);
-  return fmt::format("{} h {:02} min", whole / 3600, whole % 3600 / 60);
-}
+constexpr double kRedrawAfter_s = 0.2;
+constexpr double kLineAfter_s = 10.0;
+
+}  // namespace
 
 Progress::Progress(std::string what, std::int64_t total, bool quiet)
-    : what_(std::move(what)),
-      total_(total),
-      quiet_(quiet),
-      terminal_(isatty(STDERR_FILENO) != 0),
-      start_(Clock::now()),
-      drawn_(start_) {}
+    : quiet_(quiet), terminal_(terminal_of_stderr().redraws), start_(Clock::now()), drawn_(start_) {
+  state_.what = std::move(what);
+  state_.total = total;
+}
 
 Progress::~Progress() {
   const std::lock_guard lock(mutex_);
-  if (!quiet_ && done_ > 0) draw(true);
+  if (!quiet_ && state_.done > 0) draw(true);
 }
 
 void Progress::advance(std::int64_t count, bool from_earlier_run) {
   const std::lock_guard lock(mutex_);
-  done_ += count;
+  this->count(count, from_earlier_run);
+  draw_in_time();
+}
+
+void Progress::advance(std::int64_t count, bool from_earlier_run, std::string details) {
+  const std::lock_guard lock(mutex_);
+  this->count(count, from_earlier_run);
+  state_.details = std::move(details);
+  draw_in_time();
+}
+
+void Progress::count(std::int64_t count, bool from_earlier_run) {
+  state_.done += count;
   if (from_earlier_run) done_before_ += count;
-  const std::chrono::duration<double> since = Clock::now() - drawn_;
-  if (!quiet_ && done_ < total_ && since.count() >= (terminal_ ? 0.2 : 10.0)) draw(false);
+}
+
+void Progress::draw_in_time() {
+  if (quiet_ || state_.done >= state_.total) return;
+  const double since_s = std::chrono::duration<double>(Clock::now() - drawn_).count();
+  // On a terminal the first line comes at once, so that a user sees what the program is at.
+  if ((terminal_ && !has_drawn_) || since_s >= (terminal_ ? kRedrawAfter_s : kLineAfter_s)) draw(false);
 }
 
 void Progress::draw(bool last) {
+  has_drawn_ = true;
   drawn_ = Clock::now();
-  const double elapsed = std::chrono::duration<double>(drawn_ - start_).count();
-  const double rate = elapsed > 0 ? static_cast<double>(done_ - done_before_) / elapsed : 0.0;
-  std::string line =
-      fmt::format("{}: {} / {} ({} %)", what_, done_, total_, total_ > 0 ? 100 * done_ / total_ : 100);
-  if (rate > 0) line += fmt::format(", {:.1f}/s", rate);
-  if (last) {
-    line += ", " + human_duration(elapsed);
-  } else if (rate > 0) {
-    line += ", " + human_duration(static_cast<double>(total_ - done_) / rate) + " left";
+  state_.elapsed_s = std::chrono::duration<double>(drawn_ - start_).count();
+  state_.per_second =
+      state_.elapsed_s > 0 ? static_cast<double>(state_.done - done_before_) / state_.elapsed_s : 0.0;
+  state_.is_last = last;
+  if (terminal_) {
+    const Terminal terminal = terminal_of_stderr();
+    fmt::print(stderr, "\r\033[K{}{}", progress_bar(state_, terminal.columns, terminal.has_colour),
+               last ? "\n" : "");
+  } else {
+    fmt::print(stderr, "{}\n", progress_line(state_));
   }
-  fmt::print(stderr, "{}{}{}", terminal_ ? "\r\033[K" : "", line, terminal_ && !last ? "" : "\n");
   std::fflush(stderr);
 }
 

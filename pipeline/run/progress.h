@@ -1,4 +1,5 @@
-// Progress of long work: one line that redraws itself on a terminal, plain lines now and then elsewhere.
+// Progress of long work on stderr: a bar that redraws itself on a terminal, plain lines now and then
+// elsewhere.
 #pragma once
 
 #include <chrono>
@@ -6,13 +7,12 @@
 #include <mutex>
 #include <string>
 
+#include "pipeline/run/progress_text.h"
+
 namespace q3d::pipeline::run {
 
-// "41 s", "12 min 05 s", "3 h 20 min".
-std::string human_duration(double seconds);
-
-// Shows done / total, rate and time left on stderr. Thread-safe. Work that an earlier run had finished is
-// counted as done but not in the rate.
+// Shows done / total, rate and time left. Thread-safe. Work that an earlier run had finished is counted as
+// done but not in the rate.
 class Progress {
  public:
   Progress(std::string what, std::int64_t total, bool quiet = false);
@@ -21,18 +21,22 @@ class Progress {
   Progress& operator=(const Progress&) = delete;
 
   void advance(std::int64_t count, bool from_earlier_run = false);
+  // The same, and tells `details` behind the numbers from now on. `count` may be 0 or negative: work that was
+  // counted too early is taken back.
+  void advance(std::int64_t count, bool from_earlier_run, std::string details);
 
  private:
   using Clock = std::chrono::steady_clock;
+  void count(std::int64_t count, bool from_earlier_run);
+  void draw_in_time();
   void draw(bool last);
 
   std::mutex mutex_;
-  std::string what_;
-  std::int64_t total_;
-  std::int64_t done_ = 0;
+  ProgressState state_;
   std::int64_t done_before_ = 0;
   bool quiet_;
   bool terminal_;
+  bool has_drawn_ = false;
   Clock::time_point start_;
   Clock::time_point drawn_;
 };

@@ -5,10 +5,12 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 #include "manifests/atomic_file.h"
 #include "pipeline/run/log.h"
+#include "pipeline/stages/made_from.h"
 #include "pipeline/stages/stage.h"
 
 namespace q3d::pipeline::stages {
@@ -24,13 +26,13 @@ fs::path plans_folder(const fs::path& out) {
   return out / "stages" / "builds";
 }
 
-ordered_json stages_json(const StageKeys& keys) {
+ordered_json stages_json(const BuildPlan& plan) {
   ordered_json stages = ordered_json::object();
   for (const Stage stage : kStages) {
     const std::string name(to_string(stage));
-    const std::string& key = key_of(keys, stage);
+    const std::string& key = key_of(plan.keys, stage);
     if (key.empty()) continue;
-    stages[name] = {{"key", key}, {"made_from", ordered_json::parse(keys.made_from.at(name))}};
+    stages[name] = {{"key", key}, {"made_from", ordered_json::parse(plan.made_from.at(name))}};
   }
   return stages;
 }
@@ -45,7 +47,7 @@ std::string text_of(const BuildPlan& plan) {
                                  {"key", plan.keys.dataset},
                                  {"candidates", plan.candidates},
                                  {"command", plan.command},
-                                 {"stages", stages_json(plan.keys)},
+                                 {"stages", stages_json(plan)},
                                  {"units", units}};
   return document.dump(2) + "\n";
 }
@@ -62,7 +64,7 @@ BuildPlan plan_from(const json& document) {
     const auto found = document.at("stages").find(name);
     if (found == document.at("stages").end()) continue;
     key_of(plan.keys, stage) = found->at("key").get<std::string>();
-    plan.keys.made_from[name] = found->at("made_from").dump();
+    plan.made_from[name] = found->at("made_from").dump();
   }
   for (const json& unit : document.at("units")) {
     plan.units.push_back({unit.at("input").get<std::string>(), unit.at("labels").get<std::string>()});
@@ -91,10 +93,15 @@ std::string version_name(const std::string& name, const StageKeys& keys) {
   return name + "-" + keys.dataset.substr(0, kShortKey);
 }
 
-BuildPlan plan_of(const std::string& name, const candidates::Ingest& ingest, StageKeys keys,
+BuildPlan plan_of(const config::BuildConfig& config, const config::JudgingRules& rules,
+                  const candidates::Ingest& ingest, const AssetDigests& assets, const std::string& device_key,
                   std::vector<std::string> command) {
-  BuildPlan plan{
-      name, static_cast<std::int64_t>(ingest.candidates.size()), {}, std::move(keys), std::move(command)};
+  BuildPlan plan;
+  plan.name = config.name;
+  plan.candidates = static_cast<std::int64_t>(ingest.candidates.size());
+  plan.keys = stage_keys(config, rules, ingest, assets, device_key);
+  plan.made_from = made_from(config, rules, ingest, assets, device_key);
+  plan.command = std::move(command);
   for (const candidates::Unit& unit : ingest.units) {
     plan.units.push_back({unit.input_digest, unit.label_digest});
   }

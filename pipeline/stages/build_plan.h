@@ -1,13 +1,13 @@
 // What a build is going to make: its units and the keys of its stages.
 //
-// A build writes its plan as soon as the candidates are read, to <out>/stages/builds/<name>-<key>.json. With it,
-// others can say how far the build has come (`status`), and why a later build makes a stage anew
+// A build writes its plan as soon as the candidates are read, to <out>/stages/builds/<name>-<key>.json. With
+// it, others can say how far the build has come (`status`), and why a later build makes a stage anew
 // (`build --dry-run`). No result depends on a plan, and it is no part of a dataset.
 #pragma once
 
 #include <cstdint>
 #include <filesystem>
-#include <optional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -27,13 +27,16 @@ struct BuildPlan {
   std::int64_t candidates = 0;
   std::vector<PlannedUnit> units;
   StageKeys keys;
-  std::vector<std::string> command;  // the words after the program's name, as the user gave them; may be empty
+  std::map<std::string, std::string> made_from;  // as of made_from.h
+  std::vector<std::string>
+      command;  // the words after the program's name, as the user gave them; may be empty
 };
 
 // "<name>-<first 12 hex digits of the dataset's key>": the name of a version's folder.
 std::string version_name(const std::string& name, const StageKeys& keys);
 
-BuildPlan plan_of(const std::string& name, const candidates::Ingest& ingest, StageKeys keys,
+BuildPlan plan_of(const config::BuildConfig& config, const config::JudgingRules& rules,
+                  const candidates::Ingest& ingest, const AssetDigests& assets, const std::string& device_key,
                   std::vector<std::string> command);
 
 // Where the plan of a version lies.

@@ -13,11 +13,11 @@ struct StageKeys;
 
 enum class Stage : std::uint8_t { ingest, predict, fidelity, refine, measure, crops, shards };
 
-inline constexpr std::array<Stage, 7> kStages{Stage::ingest, Stage::predict, Stage::fidelity, Stage::refine,
-                                              Stage::measure, Stage::crops, Stage::shards};
+inline constexpr std::array<Stage, 7> kStages{Stage::ingest,  Stage::predict, Stage::fidelity, Stage::refine,
+                                              Stage::measure, Stage::crops,   Stage::shards};
 
 std::string_view to_string(Stage stage);
-Stage stage_from_string(std::string_view name);  // throws std::invalid_argument on an unknown name
+Stage stage_from_string(std::string_view name);   // throws std::invalid_argument on an unknown name
 std::span<const std::string_view> stage_names();  // in the order of the enumerators
 
 // Whether the stage has a folder with a file for each unit. `ingest` has the build's plan (build_plan.h), and

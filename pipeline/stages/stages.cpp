@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
+#include <map>
 #include <optional>
 #include <stdexcept>
 #include <utility>
@@ -14,6 +15,7 @@
 #include "manifests/shard.h"
 #include "pipeline/config/build_settings.h"
 #include "pipeline/run/log.h"
+#include "pipeline/stages/made_from.h"
 #include "pipeline/stages/stage.h"
 
 namespace q3d::pipeline::stages {
@@ -126,12 +128,49 @@ std::string crops_text(const config::ShardConfig& shards) {
   return key_text("crops", kCropsCode, std::move(parts));
 }
 
-// Sets the stage's key and what it is made from.
-const std::string& set_key(StageKeys& keys, Stage stage, std::string text) {
-  std::string& key = key_of(keys, stage);
-  key = manifests::sha256(text);
-  keys.made_from[std::string(to_string(stage))] = std::move(text);
-  return key;
+// The keys with the texts that they are digests of, by the stages' names.
+struct Recipes {
+  StageKeys keys;
+  std::map<std::string, std::string> texts;
+
+  const std::string& set(Stage stage, std::string text) {
+    std::string& key = key_of(keys, stage);
+    key = manifests::sha256(text);
+    texts[std::string(to_string(stage))] = std::move(text);
+    return key;
+  }
+};
+
+Recipes recipes_of_config(const config::BuildConfig& config, const config::JudgingRules& rules,
+                          const AssetDigests& assets, const std::string& device_key) {
+  Recipes recipes;
+  const std::string& predict = recipes.set(Stage::predict, predict_text(config, assets, device_key));
+  const bool judges = config::needs_network(config);
+  json fidelity = judges ? fidelity_parts(rules) : json::object();
+  fidelity["predict"] = predict;
+  json refine = judges ? refine_parts(config.tta, config.guards) : json::object();
+  refine["fidelity"] = recipes.set(Stage::fidelity, key_text("fidelity", kFidelityCode, std::move(fidelity)));
+  if (config::uses_priors(config.tta)) refine["priors"] = assets.priors;
+  const std::string& refined = recipes.set(Stage::refine, key_text("refine", kRefineCode, std::move(refine)));
+  json shards = config::key_parts(config::shard_settings(), config.shards, config::DecidedStage::shards);
+  shards.update({{"refine", refined}, {"schema", manifests::kShardSchema}, {"name", config.name}});
+  if (judges) {
+    shards["measure"] = recipes.set(
+        Stage::measure, key_text("measure", kMeasureCode, {{"refine", refined}, {"priors", assets.priors}}));
+    shards["bounds"] = bounds_json(config.guards);
+    shards["trust"] = {{"version", filters::kTrustVersion}, {"least", rules.min_trust}};
+  }
+  recipes.set(Stage::crops, crops_text(config.shards));
+  recipes.set(Stage::shards, key_text("shards", kShardsCode, std::move(shards)));
+  return recipes;
+}
+
+Recipes recipes_of_build(const config::BuildConfig& config, const config::JudgingRules& rules,
+                         const candidates::Ingest& ingest, const AssetDigests& assets,
+                         const std::string& device_key) {
+  Recipes recipes = recipes_of_config(config, rules, assets, device_key);
+  recipes.set(Stage::ingest, ingest_text(config, ingest));
+  return recipes;
 }
 
 }  // namespace
@@ -158,38 +197,23 @@ std::string crops_key(const config::ShardConfig& shards) {
 
 StageKeys keys_of_config(const config::BuildConfig& config, const config::JudgingRules& rules,
                          const AssetDigests& assets, const std::string& device_key) {
-  StageKeys keys;
-  set_key(keys, Stage::predict, predict_text(config, assets, device_key));
-  const bool judges = config::needs_network(config);
-  json fidelity = judges ? fidelity_parts(rules) : json::object();
-  fidelity["predict"] = keys.predict;
-  set_key(keys, Stage::fidelity, key_text("fidelity", kFidelityCode, std::move(fidelity)));
-  json refine = judges ? refine_parts(config.tta, config.guards) : json::object();
-  refine["fidelity"] = keys.fidelity;
-  if (config::uses_priors(config.tta)) refine["priors"] = assets.priors;
-  set_key(keys, Stage::refine, key_text("refine", kRefineCode, std::move(refine)));
-  json shards = config::key_parts(config::shard_settings(), config.shards, config::DecidedStage::shards);
-  shards.update({{"refine", keys.refine}, {"schema", manifests::kShardSchema}, {"name", config.name}});
-  if (judges) {
-    shards["measure"] =
-        set_key(keys, Stage::measure,
-                key_text("measure", kMeasureCode, {{"refine", keys.refine}, {"priors", assets.priors}}));
-    shards["bounds"] = bounds_json(config.guards);
-    shards["trust"] = {{"version", filters::kTrustVersion}, {"least", rules.min_trust}};
-  }
-  set_key(keys, Stage::crops, crops_text(config.shards));
-  set_key(keys, Stage::shards, key_text("shards", kShardsCode, std::move(shards)));
-  return keys;
+  return recipes_of_config(config, rules, assets, device_key).keys;
 }
 
 StageKeys stage_keys(const config::BuildConfig& config, const config::JudgingRules& rules,
                      const candidates::Ingest& ingest, const AssetDigests& assets,
                      const std::string& device_key) {
-  StageKeys keys = keys_of_config(config, rules, assets, device_key);
-  set_key(keys, Stage::ingest, ingest_text(config, ingest));
+  StageKeys keys = recipes_of_build(config, rules, ingest, assets, device_key).keys;
   keys.dataset = manifests::sha256(key_text(
       "dataset", 1, {{"ingest", keys.ingest}, {"shards", keys.shards}, {"version", config.version}}));
   return keys;
+}
+
+std::map<std::string, std::string> made_from(const config::BuildConfig& config,
+                                             const config::JudgingRules& rules,
+                                             const candidates::Ingest& ingest, const AssetDigests& assets,
+                                             const std::string& device_key) {
+  return recipes_of_build(config, rules, ingest, assets, device_key).texts;
 }
 
 std::filesystem::path stage_folder(const std::filesystem::path& out, const std::string& stage,

@@ -10,7 +10,6 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include <filesystem>
-#include <map>
 #include <string>
 
 #include "manifests/digest.h"
@@ -42,9 +41,6 @@ struct StageKeys {
   std::string crops;    // the bytes of stored crops; thresholds and network have no part in it
   std::string shards;
   std::string dataset;  // the version: everything above
-  // By stage, the canonical JSON text whose SHA-256 is the key; `dataset` has none. Empty where keys were read
-  // from a dataset.json, which states none.
-  std::map<std::string, std::string> made_from;
 };
 
 std::string predict_key(const config::BuildConfig& config, const AssetDigests& assets,

@@ -154,8 +154,7 @@ BuildStatus build_status(const fs::path& out, const stages::BuildPlan& plan) {
   build.has_plan = true;
   build.candidates = plan.candidates;
   build.units = static_cast<std::int64_t>(plan.units.size());
-  build.stages =
-      stages_of(out, plan.keys, {build.units, &plan.units}, stages::plan_file(out, build.version));
+  build.stages = stages_of(out, plan.keys, {build.units, &plan.units}, stages::plan_file(out, build.version));
   build.command = plan.command;
   find_results(out, build);
   return build;

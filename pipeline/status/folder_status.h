@@ -11,17 +11,17 @@
 
 namespace q3d::pipeline::status {
 
-// Of one build. Units are told apart by their input, so a unit that was made from other pictures or labels counts as
-// missing. Files are compared by their sizes; `verify` and the next build read them whole.
+// Of one build. Units are told apart by their input, so a unit that was made from other pictures or labels
+// counts as missing. Files are compared by their sizes; `verify` and the next build read them whole.
 struct StageStatus {
   stages::Stage stage = stages::Stage::ingest;
-  std::string key;                     // 64 hex digits; empty where dataset.json does not state it
-  std::filesystem::path manifest;      // relative to the output folder; empty if the stage has none
-  bool has_manifest = false;           // it is there
-  std::int64_t finished = 0;           // units
-  std::vector<std::int64_t> missing;   // units that are still to be made, ascending
-  std::vector<std::int64_t> damaged;   // of those, the ones whose file is gone or of another size
-  std::int64_t not_needed = 0;         // units without stored crops that have their shard
+  std::string key;                    // 64 hex digits; empty where dataset.json does not state it
+  std::filesystem::path manifest;     // relative to the output folder; empty if the stage has none
+  bool has_manifest = false;          // it is there
+  std::int64_t finished = 0;          // units
+  std::vector<std::int64_t> missing;  // units that are still to be made, ascending
+  std::vector<std::int64_t> damaged;  // of those, the ones whose file is gone or of another size
+  std::int64_t not_needed = 0;        // units without stored crops that have their shard
 };
 
 // A file or folder that comes after the stages.
@@ -34,7 +34,7 @@ struct BuildStatus {
   std::string version;  // "<name>-<first 12 hex digits of the key>", the name of its folder
   std::string key;
   bool is_latest = false;
-  bool has_plan = false;  // without one, units are counted by the journals alone, whatever their input was
+  bool has_plan = false;    // without one, units are counted by the journals alone, whatever their input was
   bool is_derived = false;  // made by `merge` or `subset`: it has no stages
   std::int64_t candidates = 0;
   std::int64_t units = 0;
@@ -59,9 +59,9 @@ struct FolderStatus {
 // The status of one build whose plan is known, whether or not it has been written.
 BuildStatus build_status(const std::filesystem::path& out, const stages::BuildPlan& plan);
 
-// Reads the plans, the journals and every dataset.json below `out`, and changes nothing; a build may be running in the
-// folder. Throws std::runtime_error if `out` holds no stages and no dataset, or if a dataset.json is damaged, and
-// manifests::IoError.
+// Reads the plans, the journals and every dataset.json below `out`, and changes nothing; a build may be
+// running in the folder. Throws std::runtime_error if `out` holds no stages and no dataset, or if a
+// dataset.json is damaged, and manifests::IoError.
 FolderStatus folder_status(const std::filesystem::path& out);
 
 }  // namespace q3d::pipeline::status

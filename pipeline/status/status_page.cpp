@@ -57,7 +57,8 @@ std::string remark(const StageStatus& stage) {
   }
   if (!stage.missing.empty()) text += fmt::format("; {} missing", units_are(stage.missing));
   if (!stage.damaged.empty()) {
-    text += fmt::format("; of these, {} damaged: the file is gone or has another size", units_are(stage.damaged));
+    text +=
+        fmt::format("; of these, {} damaged: the file is gone or has another size", units_are(stage.damaged));
   }
   return text;
 }
@@ -72,19 +73,19 @@ std::string result_line(const std::string& indent, std::string_view name, const 
 }
 
 std::string build_page(const BuildStatus& build) {
-  std::string text = fmt::format("  {}{}: {} in {}, {}\n", build.version, build.is_latest ? " (latest)" : "",
-                                 run::counted(build.candidates, "candidate"), run::counted(build.units, "unit"),
-                                 build.dataset.is_there ? "finished" : "not finished");
+  std::string text =
+      fmt::format("  {}{}: {} in {}, {}\n", build.version, build.is_latest ? " (latest)" : "",
+                  run::counted(build.candidates, "candidate"), run::counted(build.units, "unit"),
+                  build.dataset.is_there ? "finished" : "not finished");
   if (build.is_derived) return text + "    It was made from other versions and has no stages of its own.\n";
   text += stage_table(build, "    ");
   if (!build.has_plan) {
     text += "    It has no plan, so its units are counted whatever pictures they were made from.\n";
   }
   if (build.dataset.is_there) return text;
-  return text + (build.command.empty()
-                     ? std::string("    next: run its `build` again; it goes on\n")
-                     : fmt::format("    next, in the folder where it was started: {}\n",
-                                   run::command_line(build.command)));
+  return text + (build.command.empty() ? std::string("    next: run its `build` again; it goes on\n")
+                                       : fmt::format("    next, in the folder where it was started: {}\n",
+                                                     run::command_line(build.command)));
 }
 
 ordered_json to_json(const StageStatus& stage) {

@@ -40,14 +40,6 @@ manifests::Judgement judge_annotated(double error) {
   return judgement;
 }
 
-manifests::Judgement judge_predicted(const UnitWork& work, std::size_t i, const config::JudgingRules& rules) {
-  const PredictedSample& predicted = (*work.predicted)[i];
-  if (predicted.failure != Reason::none) return failed(predicted.failure, predicted.detail);
-  const candidates::Candidate& candidate = work.candidates[i];
-  if (candidate.role != config::Role::pseudo) return judge_annotated(work.errors[i]);
-  return filters::judge_initial(work.errors[i], rules.of(candidate.record.dataset));
-}
-
 // Discards a label that is trusted too little.
 void apply_min_trust(double min_trust, manifests::Judgement& judgement) {
   if (!is_kept(judgement) || !(judgement.trust.combined < min_trust)) return;
@@ -56,16 +48,21 @@ void apply_min_trust(double min_trust, manifests::Judgement& judgement) {
   judgement.detail = fmt::format("trust {:.4g}, min_trust {:.4g}", judgement.trust.combined, min_trust);
 }
 
-// Discards a candidate that the user or a test split excludes. It keeps its numbers; a failed one stays
-// failed.
+}  // namespace
+
+manifests::Judgement judge_predicted(const candidates::Candidate& candidate, const PredictedSample& predicted,
+                                     double error, const config::JudgingRules& rules) {
+  if (predicted.failure != Reason::none) return failed(predicted.failure, predicted.detail);
+  if (candidate.role != config::Role::pseudo) return judge_annotated(error);
+  return filters::judge_initial(error, rules.of(candidate.record.dataset));
+}
+
 void apply_exclusion(const candidates::Exclusion& exclusion, manifests::Judgement& judgement) {
   if (exclusion.reason == Reason::none || judgement.verdict == Verdict::failed) return;
   judgement.verdict = Verdict::discarded;
   judgement.reason = exclusion.reason;
   judgement.detail = exclusion.detail;
 }
-
-}  // namespace
 
 manifests::Judgement judge_refined(const device::CropKeypoints& keypoints, double error,
                                    const RefinedSample& refined, const filters::Thresholds& thresholds,
@@ -103,7 +100,7 @@ manifests::Judgement judge_refined(const device::CropKeypoints& keypoints, doubl
 void judge_unit(UnitWork& work, const config::JudgingRules& rules) {
   work.judgements.assign(work.candidates.size(), {});
   for (std::size_t i = 0; i < work.candidates.size(); ++i) {
-    work.judgements[i] = judge_predicted(work, i, rules);
+    work.judgements[i] = judge_predicted(work.candidates[i], (*work.predicted)[i], work.errors[i], rules);
   }
   if (work.refined) {
     for (const RefinedSample& refined : *work.refined) {

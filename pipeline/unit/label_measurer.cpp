@@ -87,7 +87,8 @@ manifests::TrustScores LabelMeasurer::measure_one(const UnitWork& work, const La
   return scores;
 }
 
-std::vector<MeasuredLabel> LabelMeasurer::measure(const UnitWork& work, const NetworkSource& network) const {
+std::vector<MeasuredLabel> LabelMeasurer::measure(const UnitWork& work, const NetworkSource& network,
+                                                  const Watch& watch) const {
   const std::vector<Label> labels = kept_labels(work);
   std::vector<MeasuredLabel> measured(labels.size());
   if (labels.empty()) return measured;
@@ -99,7 +100,12 @@ std::vector<MeasuredLabel> LabelMeasurer::measure(const UnitWork& work, const Ne
   }
   const std::vector<device::BodyMesh> meshes = meshes_->pose(bodies);
   const std::vector<device::PatchView> views(patches.begin(), patches.end());
-  const std::vector<device::BodyPrediction> mirrored = network().predict(views);
+  std::vector<device::BodyPrediction> mirrored;
+  watch.for_each_batch(views.size(), [&](std::size_t first, std::size_t count) {
+    const auto some = network().predict(std::span(views).subspan(first, count));
+    mirrored.insert(mirrored.end(), some.begin(), some.end());
+    if (watch.observer != nullptr) watch.observer->batch_done(work, "measure", first + count, views.size());
+  });
   tbb::parallel_for(std::size_t{0}, labels.size(), [&](std::size_t i) {
     measured[i].sample = labels[i].sample;
     measured[i].scores = measure_one(work, labels[i], meshes[i]);

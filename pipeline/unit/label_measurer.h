@@ -9,6 +9,7 @@
 #include "filters/guard_measures.h"
 #include "pipeline/device/body_meshes.h"
 #include "pipeline/unit/network_source.h"
+#include "pipeline/unit/step_observer.h"
 #include "pipeline/unit/unit_work.h"
 
 namespace q3d::pipeline::unit {
@@ -27,7 +28,8 @@ class LabelMeasurer {
   // Returns the scores of the candidates with pseudo labels that work.judgements keeps, in their order.
   // work.decoded must hold their patches, which are mirrored and predicted in batches inside the unit, and
   // their masks.
-  std::vector<MeasuredLabel> measure(const UnitWork& work, const NetworkSource& network) const;
+  std::vector<MeasuredLabel> measure(const UnitWork& work, const NetworkSource& network,
+                                     const Watch& watch = {}) const;
 
  private:
   struct Label;

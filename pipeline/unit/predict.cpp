@@ -17,40 +17,57 @@ void take_annotated_body(const candidates::Candidate& candidate, PredictedSample
   }
 }
 
+// What is known of a candidate before the network is asked.
+PredictedSample decoded_sample(const candidates::Candidate& candidate, const DecodedSample& decoded) {
+  const manifests::SampleRecord& record = candidate.record;
+  PredictedSample sample;
+  sample.failure = record.failure != Reason::none ? record.failure : decoded.failure;
+  sample.detail = record.failure != Reason::none ? record.failure_detail : decoded.detail;
+  sample.image_width_px = decoded.image_width_px;
+  sample.image_height_px = decoded.image_height_px;
+  sample.has_mask = decoded.has_mask;
+  return sample;
+}
+
+void take_predicted_body(const device::BodyPrediction& body, PredictedSample& sample) {
+  if (device::is_finite(body)) {
+    sample.body = body;
+  } else {
+    sample.failure = Reason::prediction_not_finite;
+    sample.detail = "the network's output holds NaN or infinity";
+  }
+}
+
 }  // namespace
 
-void predict_unit(UnitWork& work, const NetworkSource& network) {
+void predict_unit(UnitWork& work, const NetworkSource& network, const Watch& watch) {
   if (work.predicted) return;
   std::vector<PredictedSample> samples(work.candidates.size());
   std::vector<device::PatchView> patches;
   std::vector<std::size_t> positions;
   for (std::size_t i = 0; i < samples.size(); ++i) {
-    const manifests::SampleRecord& record = work.candidates[i].record;
-    const DecodedSample& decoded = work.decoded[i];
-    samples[i].failure = record.failure != Reason::none ? record.failure : decoded.failure;
-    samples[i].detail = record.failure != Reason::none ? record.failure_detail : decoded.detail;
-    samples[i].image_width_px = decoded.image_width_px;
-    samples[i].image_height_px = decoded.image_height_px;
-    samples[i].has_mask = decoded.has_mask;
-    if (samples[i].failure != Reason::none) continue;
-    if (work.candidates[i].role != config::Role::pseudo) {
-      take_annotated_body(work.candidates[i], samples[i]);
+    samples[i] = decoded_sample(work.candidates[i], work.decoded[i]);
+    const bool is_pseudo = work.candidates[i].role == config::Role::pseudo;
+    if (samples[i].failure == Reason::none && is_pseudo) {
+      patches.emplace_back(work.decoded[i].patch);
+      positions.push_back(i);
       continue;
     }
-    patches.emplace_back(decoded.patch);
-    positions.push_back(i);
+    if (samples[i].failure == Reason::none) take_annotated_body(work.candidates[i], samples[i]);
+    if (watch.observer != nullptr) watch.observer->predicted(work, i, samples[i]);
   }
-  std::vector<device::BodyPrediction> bodies;
-  if (!patches.empty()) bodies = network().predict(patches);
-  for (std::size_t j = 0; j < bodies.size(); ++j) {
-    PredictedSample& sample = samples[positions[j]];
-    if (device::is_finite(bodies[j])) {
-      sample.body = bodies[j];
-    } else {
-      sample.failure = Reason::prediction_not_finite;
-      sample.detail = "the network's output holds NaN or infinity";
+  watch.for_each_batch(patches.size(), [&](std::size_t first, std::size_t count) {
+    const std::vector<device::BodyPrediction> bodies =
+        network().predict(std::span(patches).subspan(first, count));
+    for (std::size_t j = 0; j < bodies.size(); ++j) {
+      const std::size_t i = positions[first + j];
+      take_predicted_body(bodies[j], samples[i]);
+      if (watch.observer != nullptr) watch.observer->predicted(work, i, samples[i]);
     }
-  }
+    if (watch.observer != nullptr) {
+      watch.observer->batch_done(work, "predict", first + count, patches.size());
+    }
+  });
   set_predictions(work, std::move(samples));
 }
 

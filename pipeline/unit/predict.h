@@ -2,6 +2,7 @@
 #pragma once
 
 #include "pipeline/unit/network_source.h"
+#include "pipeline/unit/step_observer.h"
 #include "pipeline/unit/unit_work.h"
 
 namespace q3d::pipeline::unit {
@@ -10,6 +11,6 @@ namespace q3d::pipeline::unit {
 // network's prediction, in batches inside the unit; a prediction that is not finite is a failed sample. The
 // other candidates get the body that their annotation gives, or none. Does nothing if work.predicted is
 // there.
-void predict_unit(UnitWork& work, const NetworkSource& network);
+void predict_unit(UnitWork& work, const NetworkSource& network, const Watch& watch = {});
 
 }  // namespace q3d::pipeline::unit

@@ -25,7 +25,8 @@ device::AdaptRequest adapt_request(const std::string& id, const device::CropKeyp
   return request;
 }
 
-void refine_unit(UnitWork& work, const NetworkSource& network, const config::JudgingRules& rules) {
+void refine_unit(UnitWork& work, const NetworkSource& network, const config::JudgingRules& rules,
+                 const Watch& watch) {
   if (work.refined) return;
   std::vector<device::AdaptRequest> requests;
   std::vector<RefinedSample> samples;
@@ -38,13 +39,17 @@ void refine_unit(UnitWork& work, const NetworkSource& network, const config::Jud
                                      work.errors[i], thresholds, rules.guards));
     samples.emplace_back().sample = i;
   }
-  std::vector<device::AdaptOutcome> outcomes;
-  if (!requests.empty()) outcomes = network().adapt(requests);
-  for (std::size_t j = 0; j < outcomes.size(); ++j) {
-    samples[j].curve = std::move(outcomes[j].curve);
-    samples[j].held_out_curve = std::move(outcomes[j].held_out_curve);
-    samples[j].body = outcomes[j].best;
-  }
+  watch.for_each_batch(requests.size(), [&](std::size_t first, std::size_t count) {
+    std::vector<device::AdaptOutcome> outcomes = network().adapt(std::span(requests).subspan(first, count));
+    for (std::size_t j = 0; j < outcomes.size(); ++j) {
+      RefinedSample& sample = samples[first + j];
+      sample.curve = std::move(outcomes[j].curve);
+      sample.held_out_curve = std::move(outcomes[j].held_out_curve);
+      sample.body = outcomes[j].best;
+      if (watch.observer != nullptr) watch.observer->refined(work, sample);
+    }
+    if (watch.observer != nullptr) watch.observer->batch_done(work, "refine", first + count, requests.size());
+  });
   work.refined = std::move(samples);
 }
 

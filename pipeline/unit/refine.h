@@ -6,6 +6,7 @@
 #include "filters/fidelity.h"
 #include "pipeline/config/judging_rules.h"
 #include "pipeline/unit/network_source.h"
+#include "pipeline/unit/step_observer.h"
 #include "pipeline/unit/unit_work.h"
 
 namespace q3d::pipeline::unit {
@@ -21,6 +22,7 @@ device::AdaptRequest adapt_request(const std::string& id, const device::CropKeyp
 // Fills work.refined: adapts the candidates that the rule adapts, in batches inside the unit. The image
 // features are computed again from the crops, so that a resumed build gives the same bits as a build in one
 // go. Does nothing if work.refined is there.
-void refine_unit(UnitWork& work, const NetworkSource& network, const config::JudgingRules& rules);
+void refine_unit(UnitWork& work, const NetworkSource& network, const config::JudgingRules& rules,
+                 const Watch& watch = {});
 
 }  // namespace q3d::pipeline::unit

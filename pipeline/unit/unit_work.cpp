@@ -1,11 +1,9 @@
 #include "pipeline/unit/unit_work.h"
 
 #include <algorithm>
-#include <limits>
 
-#include "filters/metrics.h"
-#include "pipeline/unit/annotated_body.h"
 #include "pipeline/unit/crop_keypoints.h"
+#include "pipeline/unit/prediction_error.h"
 
 namespace q3d::pipeline::unit {
 
@@ -26,14 +24,8 @@ std::shared_ptr<UnitWork> open_unit(const candidates::Ingest& ingest, std::int64
 }
 
 void set_predictions(UnitWork& work, std::vector<PredictedSample> samples) {
-  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-  work.errors.assign(samples.size(), kNone);
-  for (std::size_t i = 0; i < samples.size(); ++i) {
-    if (samples[i].failure != manifests::Reason::none) continue;
-    if (!has_projection(samples[i].body.keypoints_2d)) continue;
-    work.errors[i] =
-        filters::projection_error(samples[i].body.keypoints_2d, work.keypoints[i]).value_or(kNone);
-  }
+  work.errors.resize(samples.size());
+  for (std::size_t i = 0; i < samples.size(); ++i) work.errors[i] = error_of(samples[i], work.keypoints[i]);
   work.predicted = std::move(samples);
 }
 

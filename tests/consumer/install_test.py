@@ -49,6 +49,15 @@ class Installed(unittest.TestCase):
         self.assertRegex(run(program, "--version"), r"^quadruped3d \d+\.\d+\.\d+\n$")
         self.assertIn(ids_of_shard()[0], run(program, "inspect", SHARD, "--json"))
 
+    def test_completions_and_the_manual_page_lie_where_shells_and_man_look(self):
+        for file, beginning in (("bash-completion/completions/quadruped3d", "# bash completion"),
+                                ("zsh/site-functions/_quadruped3d", "#compdef quadruped3d"),
+                                ("fish/vendor_completions.d/quadruped3d.fish", "# fish completion"),
+                                ("man/man1/quadruped3d.1", ".\\\"")):
+            text = (self.prefix / "share" / file).read_text()
+            self.assertTrue(text.startswith(beginning), text[:40])
+            self.assertIn("evaluate", text)
+
     def test_no_program_looks_for_libraries_by_an_absolute_path(self):
         for program in (self.prefix / "bin/quadruped3d", self.prefix / "libexec/quadruped3d/quadruped3d-network"):
             for path in re.findall(r"(?:RUNPATH|RPATH).*\[(.*)\]", run("readelf", "-d", program)):

@@ -136,3 +136,197 @@ class Status(Case):
 
     def test_a_folder_without_a_build_is_refused(self):
         self.assertIn("expected an output folder", run("status", self.folder, expect=1).stderr)
+
+
+class Until(Case):
+    """Builds that stop after a stage."""
+
+    @classmethod
+    def prepare(cls):
+        Scene.make(cls.shared).build("whole")
+
+    def setUp(self):
+        super().setUp()
+        self.scene = Scene(self.shared, self.folder)
+        self.whole = digests(latest(self.shared / "whole"))
+        self.names = list(stages_of(run_json("status", self.shared / "whole")["builds"][0]))
+
+    def next_command(self, result):
+        line, = [line for line in result.stderr.splitlines() if line.startswith("next: ")]
+        return shlex.split(line[len("next: "):])
+
+    def test_a_build_stops_after_each_stage_and_goes_on_to_the_same_bytes(self):
+        for stage in self.names:
+            with self.subTest(stage=stage):
+                result = self.scene.build(stage, "--until", stage)
+                out = self.folder / stage
+                self.assertIn(f"stopped after the stage {stage}", result.stderr)
+                self.assertFalse((out / "latest").exists())
+                self.assertEqual(list(out.glob("*/dataset.json")), [])
+                for name in ("predict", "refine", "measure", "shards"):
+                    wanted = set(range(UNITS)) if self.names.index(name) <= self.names.index(stage) else set()
+                    self.assertEqual(units_in_journals(out, name), wanted, name)
+                self.assertEqual(bool(units_in_journals(out, "crops")), stage in ("crops", "shards"))
+                self.assertIn(f"{stage} ", result.stderr)
+                run(*self.next_command(result)[1:])
+                self.assertEqual(digests(latest(out)), self.whole)
+
+    def test_stage_after_stage_in_one_folder(self):
+        for stage in self.names:
+            summary = json.loads(self.scene.build("out", "--until", stage, "--json").stdout)
+            self.assertEqual(summary["stopped_after"], stage)
+            done = stages_of(summary["build"])
+            for name in self.names[: self.names.index(stage) + 1]:
+                self.assertEqual(done[name]["units_missing"], [], (stage, name))
+            self.assertFalse(summary["build"]["finished"])
+        self.scene.build("out")
+        self.assertEqual(digests(self.scene.latest("out")), self.whole)
+
+    def test_a_finished_dataset_is_told_as_such(self):
+        self.copy_of("whole")
+        result = self.scene.build("whole", "--until", "predict")
+        self.assertIn("was up to date", result.stderr)
+        self.assertNotIn("stopped after", result.stderr)
+
+    def test_the_command_that_goes_on_has_the_veto(self):
+        veto = self.folder / "left out.txt"
+        veto.write_text(verdicts(latest(self.shared / "whole"))[0]["id"] + "\tseen by eye\n")
+        result = self.scene.build("out", "--until", "refine", "--veto", veto)
+        words = self.next_command(result)
+        self.assertEqual(words[words.index("--veto") + 1], str(veto))
+        run(*words[1:])
+        self.assertEqual(verdicts(self.scene.latest("out"))[0]["reason"], "vetoed")
+
+    def test_labels_of_the_annotations_stop_too(self):
+        """Without pseudo labels there is nothing to measure, and no network is loaded."""
+        config = self.scene.write_config("flat.json", datasets=[
+            {"name": "drawn", "format": "prima", "root": str(self.scene.data), "annotations": "train.json",
+             "split": "train", "role": "2d_only"}])
+        for stage in ("predict", "measure", "crops"):
+            self.scene.build("out", "--until", stage, config=config)
+            self.assertEqual(units_in_journals(self.folder / "out", "shards"), set())
+        self.scene.build("out", config=config)
+        self.scene.build("other", config=config)
+        self.assertEqual(digests(self.scene.latest("out")), digests(self.scene.latest("other")))
+
+    def test_an_unknown_stage_is_wrong_usage(self):
+        said = self.scene.build("out", "--until", "prediction", expect=2).stderr
+        self.assertIn("--until", said)
+        self.assertIn("predict", said)
+        self.assertFalse((self.folder / "out").exists())
+
+
+class DryRun(Case):
+    """What a build would make, against what it then makes."""
+
+    @classmethod
+    def prepare(cls):
+        Scene.make(cls.shared).build("out")
+
+    def setUp(self):
+        super().setUp()
+        self.scene = Scene(self.shared, self.folder)
+        self.out = self.folder / "out"
+
+    def forecast(self, *more, **options):
+        """The dry run's stages by name and all it says. It changes no file and makes none."""
+        before = self.state()
+        document = json.loads(self.scene.build("out", "--dry-run", "--json", *more, **options).stdout)
+        text = self.scene.build("out", "--dry-run", *more, **options).stdout
+        self.assertEqual(self.state(), before)
+        for stage in document["stages"]:
+            for why in stage["why"]:
+                self.assertIn(why, text)
+        return {stage["stage"]: stage for stage in document["stages"]}, document
+
+    def state(self):
+        return {path: (path.lstat().st_mtime_ns, path.lstat().st_ino) for path in sorted(self.out.rglob("*"))}
+
+    def made_by_a_build(self, *more, **options):
+        """How many units of each stage the build adds to the journals, beside those that were there."""
+        def lines():
+            return {path: path.read_text().count("\n") for path in self.out.glob("stages/*/journal.jsonl")}
+
+        before = lines()
+        self.scene.build("out", *more, **options)
+        made = dict.fromkeys(FOLDERS, 0)
+        for path, count in lines().items():
+            made[path.parent.name.split("-")[0]] += count - before.get(path, 0)
+        return made
+
+    def assert_as_forecast(self, stages, made):
+        for name in FOLDERS:
+            if name == "crops":  # only units of which a candidate is kept get a table
+                self.assertLessEqual(made[name], stages[name]["units_made"])
+            else:
+                self.assertEqual(made[name], stages[name]["units_made"], name)
+
+    def test_an_empty_folder(self):
+        stages, document = self.forecast()
+        self.assertFalse(self.out.exists())
+        self.assertFalse(document["up_to_date"])
+        for name in FOLDERS:
+            self.assertEqual((stages[name]["units_reused"], stages[name]["units_made"]), (0, UNITS))
+            self.assertEqual(stages[name]["why"], ["no build in this folder has made the stage"])
+        self.assert_as_forecast(stages, self.made_by_a_build())
+        self.assertEqual(latest(self.out).name, document["version"])
+
+    def test_a_finished_build(self):
+        self.copy_of("out")
+        stages, document = self.forecast()
+        self.assertTrue(document["up_to_date"])
+        for name in FOLDERS:
+            self.assertEqual((stages[name]["units_made"], stages[name]["why"]), (0, []))
+        self.assertIn("a build would make nothing", self.scene.build("out", "--dry-run").stdout)
+
+    def test_another_threshold(self):
+        self.copy_of("out")
+        low = self.scene.limits["tau_low"]
+        stages, document = self.forecast("--set", f"filter.tau_low={low / 2}")
+        self.assertEqual(stages["predict"]["units_reused"], UNITS)
+        self.assertEqual(stages["crops"]["units_made"] + stages["crops"]["units_reused"], UNITS)
+        why, = stages["refine"]["why"]
+        self.assertTrue(why.startswith(f"its key differs from that of {latest(self.shared / 'out').name}: tau_low: "), why)
+        self.assertIn(f" -> {low / 2}"[:12], why)
+        self.assertIn("the stage refine before it is another", stages["measure"]["why"][0])
+        self.assert_as_forecast(stages, self.made_by_a_build("--set", f"filter.tau_low={low / 2}"))
+        self.assertEqual(latest(self.out).name, document["version"])
+
+    def test_another_quality_of_the_crops(self):
+        self.copy_of("out")
+        stages, _ = self.forecast("--set", "shards.jpeg_quality=40")
+        for name in ("predict", "refine", "measure"):
+            self.assertEqual(stages[name]["units_made"], 0)
+        for name in ("crops", "shards"):
+            self.assertIn("jpeg_quality: 95 -> 40", stages[name]["why"][0])
+        self.assert_as_forecast(stages, self.made_by_a_build("--set", "shards.jpeg_quality=40"))
+
+    def test_damage_and_what_is_not_made_yet(self):
+        self.scene.build("out", "--until", "refine")
+        folder, = self.out.glob("stages/refine-*")
+        flip_bit(folder / "unit-000002.h5")
+        (folder / "unit-000003.h5").unlink()
+        stages, _ = self.forecast()
+        self.assertEqual(stages["refine"]["why"], ["2 units whose file is gone or damaged"])
+        self.assertEqual(stages["shards"]["units_made"], UNITS)
+        self.assert_as_forecast(stages, self.made_by_a_build())
+
+    def test_a_veto_makes_one_unit_anew(self):
+        self.copy_of("out")
+        veto = self.folder / "veto.txt"
+        veto.write_text(verdicts(latest(self.out))[UNIT]["id"] + "\n")
+        stages, _ = self.forecast("--veto", veto)
+        self.assertEqual(stages["predict"]["units_made"], 0)
+        self.assertEqual(stages["shards"]["units_made"], 1)
+        self.assertEqual(stages["shards"]["why"], ["1 unit with other pictures, labels or exclusions than before"])
+        self.assert_as_forecast(stages, self.made_by_a_build("--veto", veto))
+
+    def test_the_search_for_leaks_leaves_nothing(self):
+        test_set = {"name": "test", "format": "prima", "root": str(self.scene.data), "annotations": "train.json",
+                    "split": "test"}
+        config = self.scene.write_config("leaks.json", leakage={"test_sets": [test_set]})
+        self.forecast(config=config)
+        self.assertFalse(self.out.exists())
+
+    def test_a_dry_run_has_no_stage_to_stop_after(self):
+        self.scene.build("out", "--dry-run", "--until", "predict", expect=2)

@@ -1,0 +1,56 @@
+// The progress of a build: how many candidates have their verdict, which verdicts, and the step that the
+// present unit is at.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+
+#include "manifests/verdict.h"
+#include "pipeline/config/judging_rules.h"
+#include "pipeline/run/progress.h"
+#include "pipeline/unit/step_observer.h"
+
+namespace q3d::pipeline::build {
+
+// Which results a run makes, of those that decide verdicts.
+struct VerdictSteps {
+  bool judges = true;  // false in a run that only predicts
+  bool refines = true;
+  bool measures = true;  // guards and trust may drop what the rule keeps
+};
+
+// A candidate counts as done when no later step of the run can change its verdict: a failed or hopeless one
+// after its prediction, an adapted one after its adaptation, and a label that is measured after that. So the
+// bar moves after each batch, and the counts of the verdicts add up to what is done. Called on the device's
+// thread alone.
+class UnitProgress : public unit::StepObserver {
+ public:
+  UnitProgress(const config::JudgingRules& rules, VerdictSteps steps, std::int64_t candidates,
+               std::int64_t units, bool quiet);
+
+  void predicted(const unit::UnitWork& work, std::size_t position,
+                 const unit::PredictedSample& sample) override;
+  void refined(const unit::UnitWork& work, const unit::RefinedSample& sample) override;
+  void batch_done(const unit::UnitWork& work, std::string_view step, std::size_t done,
+                  std::size_t total) override;
+
+  // Counts the unit by its final judgements. `from_earlier_run`: nothing of it was computed in this run.
+  void finish(const unit::UnitWork& work, bool from_earlier_run);
+
+ private:
+  using Counts = std::array<std::int64_t, 4>;  // by manifests::Verdict
+  void count(manifests::Judgement judgement, const candidates::Candidate& candidate);
+  void tell(std::int64_t count, bool from_earlier_run, const std::string& step);
+
+  const config::JudgingRules& rules_;
+  VerdictSteps steps_;
+  std::int64_t units_;
+  Counts finished_{};      // of the units that are through
+  Counts present_{};       // of the present unit, so far
+  std::int64_t told_ = 0;  // candidates of the present unit that progress_ counts as done
+  std::string step_;       // of the present unit
+  run::Progress progress_;
+};
+
+}  // namespace q3d::pipeline::build

@@ -1,0 +1,25 @@
+// What `build` prints: about a finished dataset, a run that stopped after a stage, and a dry run.
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include <string>
+#include <vector>
+
+#include "pipeline/build/build.h"
+#include "pipeline/build/dry_run.h"
+
+namespace q3d::pipeline::cli {
+
+// On stderr: counts, quality, where the dataset is, and the commands that come next.
+void print_summary(const build::BuildSummary& summary);
+nlohmann::ordered_json to_json(const build::BuildSummary& summary);
+
+// On stderr, of a summary with `stopped_after`: what is there, and the command that goes on.
+void print_stop(const build::BuildSummary& summary, const std::filesystem::path& out);
+nlohmann::ordered_json stop_json(const build::BuildSummary& summary, const std::filesystem::path& out);
+
+std::string page(const build::DryRun& forecast);
+nlohmann::ordered_json to_json(const build::DryRun& forecast);
+
+}  // namespace q3d::pipeline::cli
