@@ -2,11 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <nlohmann/json.hpp>
+#include <optional>
 #include <stdexcept>
 
 #include "manifests/atomic_file.h"
 #include "manifests/link_file.h"
+#include "manifests/sealed_json.h"
 #include "pipeline/run/log.h"
 #include "pipeline/stages/build_plan.h"
 
@@ -48,6 +49,16 @@ void check_sums(const candidates::Ingest& ingest, const std::vector<manifests::J
   }
 }
 
+// What dataset.json says; nothing, and a warning, if it is not as it was written.
+std::optional<dataset::DatasetManifest> read_undamaged(const fs::path& folder) {
+  try {
+    return dataset::read_dataset_manifest(folder);
+  } catch (const manifests::DamagedDocument& error) {
+    run::log_warning(fmt::format("damaged: {}; it is published again", error.what()));
+    return std::nullopt;
+  }
+}
+
 }  // namespace
 
 fs::path version_folder(const fs::path& out, const config::BuildConfig& config,
@@ -57,17 +68,13 @@ fs::path version_folder(const fs::path& out, const config::BuildConfig& config,
 
 bool is_published(const fs::path& folder, const stages::StageKeys& keys, manifests::DigestCache& digests) {
   if (!fs::exists(folder / "dataset.json")) return false;
-  if (!nlohmann::json::accept(manifests::read_file(folder / "dataset.json"))) {
-    run::log_warning(fmt::format("{}: damaged: it is not readable JSON; it is published again",
-                                 (folder / "dataset.json").string()));
-    return false;
-  }
-  const dataset::DatasetManifest manifest = dataset::read_dataset_manifest(folder);
-  if (manifest.key != keys.dataset) {
+  const std::optional<dataset::DatasetManifest> manifest = read_undamaged(folder);
+  if (!manifest) return false;
+  if (manifest->key != keys.dataset) {
     throw std::runtime_error(
         fmt::format("{}: holds a dataset with key {}, expected {}; a finished dataset is never "
                     "written over. Build into another folder",
-                    folder.string(), manifest.key, keys.dataset));
+                    folder.string(), manifest->key, keys.dataset));
   }
   bool is_sound = true;
   const auto compare = [&](const fs::path& file, const std::string& expected) {
@@ -77,8 +84,8 @@ bool is_published(const fs::path& folder, const stages::StageKeys& keys, manifes
     run::log_warning(fmt::format("{}: damaged: {}, expected {} by dataset.json; it is published again",
                                  file.string(), got ? "got SHA-256 " + *got : "it is gone", expected));
   };
-  for (const dataset::ShardEntry& shard : manifest.shards) compare(folder / shard.file, shard.sha256);
-  compare(folder / "verdicts.csv", manifest.verdicts_sha256);
+  for (const dataset::ShardEntry& shard : manifest->shards) compare(folder / shard.file, shard.sha256);
+  compare(folder / "verdicts.csv", manifest->verdicts_sha256);
   return is_sound;
 }
 

@@ -9,6 +9,7 @@
 #include "manifests/csv.h"
 #include "manifests/digest.h"
 #include "manifests/enumerators.h"
+#include "manifests/sealed_json.h"
 #include "manifests/shard.h"
 #include "pipeline/config/effective_config.h"
 #include "pipeline/run/version.h"
@@ -277,7 +278,7 @@ std::string dataset_json(const DatasetInputs& inputs, const std::vector<manifest
                                      {"shards", keys.shards}}}}},
                                  {"verdicts", {{"file", "verdicts.csv"}, {"sha256", verdicts_sha256}}},
                                  {"shards", shard_list}};
-  return document.dump(2) + "\n";
+  return manifests::seal_json(document);
 }
 
 std::string verdicts_csv(const candidates::Ingest& ingest,

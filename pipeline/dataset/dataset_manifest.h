@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "filters/fidelity.h"
+#include "manifests/dataset_document.h"
 #include "manifests/shard.h"
 #include "manifests/verdict.h"
 #include "pipeline/candidates/ingest.h"
@@ -21,7 +22,7 @@
 
 namespace q3d::pipeline::dataset {
 
-inline constexpr const char* kDatasetFormat = "quadruped3d-dataset";
+using manifests::kDatasetFormat;
 
 struct ShardEntry {
   std::string file;  // relative to the dataset's folder
@@ -98,7 +99,8 @@ struct DatasetInputs {
 // A list of {kind, dataset, text}; `dataset` is null where a note concerns the whole pool.
 nlohmann::ordered_json notes_json(const std::vector<candidates::IngestNote>& notes);
 
-// Text of dataset.json: no time, host or absolute path of its own, so equal builds give equal bytes.
+// Text of dataset.json, which ends with a digest over itself (manifests/sealed_json.h). It has no time, host
+// or absolute path of its own, so equal builds give equal bytes.
 std::string dataset_json(const DatasetInputs& inputs, const std::vector<manifests::Judgement>& judgements,
                          const std::vector<ShardEntry>& shards, const std::string& verdicts_sha256);
 
@@ -107,10 +109,13 @@ std::string dataset_json(const DatasetInputs& inputs, const std::vector<manifest
 std::string verdicts_csv(const candidates::Ingest& ingest,
                          const std::vector<manifests::Judgement>& judgements);
 
-// Reads dataset.json of a dataset's folder, or of the newest one (`latest`) of an output folder.
-// Throws std::runtime_error that names the file, what was found and what was expected; a name that is no
-// enumerator's counts as damage.
+// Reads dataset.json of a dataset's folder, or of the newest one (`latest`) of an output folder. Throws
+// std::runtime_error that names the file, what was found and what was expected, also for a name that is no
+// enumerator's and for a shard that lies elsewhere than in the folder `shards`; and like
+// read_dataset_document.
 DatasetManifest read_dataset_manifest(const std::filesystem::path& folder);
+// The whole document, without its digest. Throws like manifests::read_dataset_document.
+nlohmann::ordered_json read_dataset_document(const std::filesystem::path& folder);
 // The folder itself, or its `latest`. Throws std::runtime_error when neither holds a dataset.json.
 std::filesystem::path dataset_folder(const std::filesystem::path& given);
 

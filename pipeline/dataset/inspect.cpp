@@ -9,7 +9,6 @@
 #include <stdexcept>
 
 #include "loaders/keypoints/topology.h"
-#include "manifests/atomic_file.h"
 #include "manifests/record_json.h"
 #include "pipeline/dataset/published_dataset.h"
 #include "smal/numbers.h"
@@ -89,7 +88,7 @@ ordered_json describe_shard(const fs::path& path) {
 ordered_json describe(const fs::path& path) {
   if (!fs::is_directory(path)) return describe_shard(path);
   const PublishedDataset dataset(path);  // refuses what it does not know
-  ordered_json document = ordered_json::parse(manifests::read_file(dataset.folder() / "dataset.json"));
+  ordered_json document = read_dataset_document(dataset.folder());
   document["folder"] = dataset.folder().string();
   document["keypoint_names"] = loaders::keypoints::topology("animal3d26").keypoints;
   return document;

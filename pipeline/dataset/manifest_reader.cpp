@@ -4,7 +4,7 @@
 
 #include <stdexcept>
 
-#include "manifests/atomic_file.h"
+#include "manifests/dataset_document.h"
 #include "manifests/shard.h"
 #include "pipeline/dataset/dataset_manifest.h"
 
@@ -12,7 +12,7 @@ namespace q3d::pipeline::dataset {
 namespace {
 
 namespace fs = std::filesystem;
-using nlohmann::json;
+using json = nlohmann::ordered_json;
 
 std::string text_of(const json& value) {
   return value.is_null() ? std::string() : value.get<std::string>();
@@ -136,7 +136,7 @@ DatasetManifest manifest_of(const json& document) {
   if (document.contains("warnings")) read_warnings(document.at("warnings"), manifest);
   read_provenance(document.at("provenance"), manifest);
   for (const json& shard : document.at("shards")) {
-    manifest.shards.push_back({shard.at("file").get<std::string>(), shard.at("sha256").get<std::string>(),
+    manifest.shards.push_back({manifests::shard_name(shard.at("file")), shard.at("sha256").get<std::string>(),
                                shard.at("bytes").get<std::int64_t>(), shard.at("rows").get<std::int64_t>(),
                                shard.at("unit").get<std::int64_t>()});
   }
@@ -155,10 +155,15 @@ fs::path dataset_folder(const fs::path& given) {
                   given.string()));
 }
 
+json read_dataset_document(const fs::path& given) {
+  return manifests::read_dataset_document(dataset_folder(given) / "dataset.json");
+}
+
 DatasetManifest read_dataset_manifest(const fs::path& given) {
   const fs::path file = dataset_folder(given) / "dataset.json";
+  const json document = read_dataset_document(given);
   try {
-    return manifest_of(json::parse(manifests::read_file(file)));
+    return manifest_of(document);
   } catch (const json::exception& error) {
     throw std::runtime_error(fmt::format("{}: not a readable dataset.json: {}", file.string(), error.what()));
   } catch (const std::exception& error) {

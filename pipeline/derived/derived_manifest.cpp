@@ -6,7 +6,6 @@
 #include <cmath>
 #include <map>
 
-#include "manifests/atomic_file.h"
 #include "manifests/csv.h"
 #include "manifests/enumerators.h"
 #include "manifests/trust.h"
@@ -208,8 +207,8 @@ ordered_json derived_manifest(const std::vector<Selection>& selections, const or
   ordered_json from = ordered_json::array();
   Counts counts;
   for (const Selection& selection : selections) {
-    const auto file = selection.dataset.folder() / "dataset.json";
-    const ordered_json& document = documents.emplace_back(ordered_json::parse(manifests::read_file(file)));
+    const ordered_json& document =
+        documents.emplace_back(dataset::read_dataset_document(selection.dataset.folder()));
     unite(datasets, datasets_of(selection, document), "roles or terms");
     unite(thresholds, document.at("thresholds"), "thresholds");
     add_annotations(annotations, document.at("provenance").value("annotations", ordered_json::object()));

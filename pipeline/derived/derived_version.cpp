@@ -11,6 +11,7 @@
 #include "manifests/atomic_file.h"
 #include "manifests/digest.h"
 #include "manifests/link_file.h"
+#include "manifests/sealed_json.h"
 #include "manifests/trust.h"
 #include "pipeline/derived/derived_manifest.h"
 #include "pipeline/run/errors.h"
@@ -155,7 +156,7 @@ DerivedVersion write_derived(const fs::path& out, const std::string& name, const
                                   {"bytes", entry.bytes},
                                   {"sha256", entry.sha256}});
   }
-  manifests::write_file_atomically(result.folder / "dataset.json", document.dump(2) + "\n");
+  manifests::write_file_atomically(result.folder / "dataset.json", manifests::seal_json(document));
   return result;
 }
 

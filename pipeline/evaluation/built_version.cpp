@@ -8,14 +8,14 @@
 #include <stdexcept>
 #include <vector>
 
-#include "manifests/atomic_file.h"
 #include "manifests/digest.h"
+#include "pipeline/dataset/dataset_manifest.h"
 
 namespace q3d::pipeline::evaluation {
 namespace {
 
 namespace fs = std::filesystem;
-using nlohmann::json;
+using json = nlohmann::ordered_json;
 
 std::set<std::string> dataset_names(const config::BuildConfig& config) {
   std::set<std::string> names;
@@ -62,7 +62,7 @@ std::vector<BuiltVersion> built_versions(const config::BuildConfig& config, cons
     const fs::path file = entry.path() / "dataset.json";
     if (entry.is_symlink() || !fs::exists(file)) continue;
     try {
-      const json document = json::parse(manifests::read_file(file));
+      const json document = dataset::read_dataset_document(entry.path());
       if (!is_of(document, config, keys, veto, corrections)) continue;
       versions.push_back({entry.path(), document.at("content_id").get<std::string>()});
     } catch (const json::exception& error) {

@@ -1,6 +1,5 @@
 #include "pipeline/statistics/statistics.h"
 
-#include "manifests/atomic_file.h"
 #include "pipeline/statistics/accuracy.h"
 #include "pipeline/statistics/distributions.h"
 #include "pipeline/statistics/explorer.h"
@@ -34,8 +33,7 @@ ordered_json warnings(const ordered_json& document) {
 }  // namespace
 
 ordered_json statistics(const dataset::PublishedDataset& dataset, const Facts& facts) {
-  const auto document = ordered_json::parse(manifests::read_file(dataset.folder() / "dataset.json"), nullptr,
-                                            /*exceptions=*/true);
+  const ordered_json document = dataset::read_dataset_document(dataset.folder());
   const dataset::DatasetManifest& manifest = dataset.manifest();
   return {{"format", kStatisticsFormat},
           {"schema", kStatisticsSchema},

@@ -7,9 +7,11 @@ be used by many threads, survives a fork and can be pickled.
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import json
 import os
 import pathlib
+import re
 import threading
 from collections.abc import Iterable, Sequence
 from typing import Any, Literal, TypeAlias
@@ -22,6 +24,9 @@ Source: TypeAlias = str | os.PathLike[str]
 
 FORMAT = "quadruped3d-shard"
 SCHEMAS = (1, 2)
+
+# The end of a dataset.json: the SHA-256 of all bytes before these two lines. Only files of schema 1 have none.
+_SEAL = re.compile(rb'  "digest": "([0-9a-f]{64})"\n}\n\Z')
 
 # The columns that schema 2 adds. A shard of schema 1 is read as if they had not been measured: NaN.
 TRUST_COLUMNS = (
@@ -212,14 +217,22 @@ def dataset_folder(source: Source) -> pathlib.Path:
 
 
 def read_manifest(source: Source) -> dict[str, Any]:
-    """dataset.json of a dataset: name, version, counts, thresholds, provenance, shards. Raises ShardError."""
+    """dataset.json of a dataset: name, version, counts, thresholds, provenance, shards; without its digest, which is
+    compared with the text. Raises ShardError."""
     file = dataset_folder(source) / "dataset.json"
+    content = file.read_bytes()
+    sealed = _SEAL.search(content)
+    if sealed and hashlib.sha256(content[: sealed.start()]).hexdigest().encode() != sealed[1]:
+        raise ShardError(f"{file}: its text is not the one that its member \"digest\" was made of: it is damaged")
     try:
-        manifest: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+        manifest: dict[str, Any] = json.loads(content)
     except ValueError as error:
         raise ShardError(f"{file}: not readable JSON: {error}") from error
     if manifest.get("format") != "quadruped3d-dataset":
         raise ShardError(f"{file}: format is {manifest.get('format')!r}, expected \"quadruped3d-dataset\"")
+    if not sealed and ("digest" in manifest or manifest.get("schema") != 1):
+        raise ShardError(f"{file}: got no digest at its end, which only files of schema 1 lack: it is damaged")
+    manifest.pop("digest", None)
     return manifest
 
 

@@ -8,7 +8,7 @@ import unittest
 import h5py
 import numpy as np
 
-from support import REPOSITORY, Folder, Shards
+from support import REPOSITORY, Folder, Shards, seal
 from quadruped3d import Shard, ShardError, load, read_manifest
 from quadruped3d.shards import shard_files
 
@@ -115,7 +115,8 @@ class Datasets(Folder):
         for name in files:
             (folder / "shards" / name).write_bytes(SCHEMA_1.read_bytes())
         (folder / "dataset.json").write_text(json.dumps(
-            {"format": "quadruped3d-dataset", "name": "set", "shards": [{"file": f"shards/{name}"} for name in listed]}))
+            {"format": "quadruped3d-dataset", "schema": 1, "name": "set",
+             "shards": [{"file": f"shards/{name}"} for name in listed]}))
         (self.folder / "out" / "latest").symlink_to(folder.name)
         return folder
 
@@ -126,6 +127,19 @@ class Datasets(Folder):
         self.assertEqual(read_manifest(self.folder / "out")["name"], "set")
         self.assertEqual(len(load(folder, ["id"])["id"]), 6)
         self.assertEqual(len(load([folder, SCHEMA_1], ["id"])["id"]), 9)
+
+    def test_a_manifest_is_compared_with_its_digest(self):
+        folder = self.make(["000000.h5"], ["000000.h5"])
+        text = seal({"format": "quadruped3d-dataset", "schema": 2, "name": "set", "shards": []})
+        (folder / "dataset.json").write_text(text)
+        self.assertEqual(read_manifest(folder)["name"], "set")
+        self.assertNotIn("digest", read_manifest(folder))
+        for at in range(len(text)):
+            content = bytearray(text.encode())
+            content[at] ^= 1
+            (folder / "dataset.json").write_bytes(content)
+            with self.assertRaises(ShardError, msg=f"byte {at}"):
+                read_manifest(folder)
 
     def test_a_folder_of_shards_needs_no_manifest(self):
         folder = self.make(["b.h5", "a.h5"], [])

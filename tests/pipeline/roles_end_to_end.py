@@ -9,8 +9,8 @@ import numpy as np
 from PIL import Image
 
 from e2e import (PICTURES, UNIT, Case, Scene, digests, draw_pictures, file_sha256, give_bodies, kill_and_resume,
-                 latest, make_network, prima_dataset, read_samples, run, run_json, verdicts, write_annotations,
-                 write_json)
+                 latest, make_network, prima_dataset, read_samples, run, run_json, seal_json, verdicts,
+                 write_annotations, write_json)
 
 ORANGE, YELLOW = (240, 159, 0), (240, 228, 66)  # pipeline/report/lettering.h
 
@@ -228,7 +228,7 @@ class Roles(Case):
             listing = "".join(entry["sha256"] + "\n" for entry in manifest["shards"])
             manifest["content_id"] = hashlib.sha256(listing.encode()).hexdigest()
             (copy / "dataset.json").chmod(0o644)
-            (copy / "dataset.json").write_text(json.dumps(manifest))
+            (copy / "dataset.json").write_text(seal_json(manifest))
             problems = run("verify", copy, expect=1).stderr
             self.assertIn(message, problems)
             self.assertNotIn("SHA-256", problems)

@@ -6,6 +6,7 @@
 
 #include "manifests/atomic_file.h"
 #include "manifests/digest.h"
+#include "manifests/sealed_json.h"
 #include "manifests/shard.h"
 
 namespace q3d::pipeline::dataset {
@@ -118,7 +119,7 @@ fs::path make_dataset(const fs::path& folder) {
         {"shards", "s"}}}};
   document["verdicts"] = {{"file", "verdicts.csv"}, {"sha256", manifests::sha256(kVerdicts)}};
   manifests::write_file_atomically(version / "verdicts.csv", std::string_view(kVerdicts));
-  manifests::write_file_atomically(version / "dataset.json", document.dump(2));
+  manifests::write_file_atomically(version / "dataset.json", manifests::seal_json(document));
   fs::create_directory_symlink(version.filename(), folder / "latest");
   return version;
 }

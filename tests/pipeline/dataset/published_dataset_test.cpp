@@ -11,6 +11,7 @@
 #include "manifests/atomic_file.h"
 #include "manifests/digest.h"
 #include "manifests/journal.h"
+#include "manifests/sealed_json.h"
 #include "pipeline/dataset/explain.h"
 #include "pipeline/dataset/verify.h"
 #include "pipeline/stages/stage_store.h"
@@ -38,12 +39,13 @@ std::string message(const std::function<void()>& call) {
 
 class Published : public ::testing::Test {
  protected:
-  // The same dataset.json with one text replaced.
+  // The same dataset.json with one text replaced, and the digest of that text.
   void replace(const std::string& from, const std::string& to) {
-    std::string text = manifests::read_file(version_ / "dataset.json");
+    std::string text = read_dataset_document(version_).dump(2);
     ASSERT_NE(text.find(from), std::string::npos);
     text.replace(text.find(from), from.size(), to);
-    manifests::write_file_atomically(version_ / "dataset.json", text);
+    manifests::write_file_atomically(version_ / "dataset.json",
+                                     manifests::seal_json(nlohmann::ordered_json::parse(text)));
   }
   // The predict stage's table of unit 0, of candidates with these ids, as a build leaves it.
   void write_predictions(const std::vector<std::string>& ids) {
@@ -99,6 +101,38 @@ TEST_F(Published, ReadsADatasetOfSchema1AndRefusesALaterOne) {
   replace("\"schema\": 1", "\"schema\": 3");
   EXPECT_THAT(message([&] { PublishedDataset{version_}; }),
               HasSubstr("schema is 3, this toolkit reads 1 to 2"));
+}
+
+TEST_F(Published, EveryFlippedBitOfDatasetJsonIsFound) {
+  const std::string sound = manifests::read_file(version_ / "dataset.json");
+  for (std::size_t at = 0; at < sound.size(); ++at) {
+    std::string text = sound;
+    text[at] = static_cast<char>(text[at] ^ (1 << at % 8));
+    manifests::write_file_atomically(version_ / "dataset.json", text);
+    EXPECT_THROW(read_dataset_manifest(version_), manifests::DamagedDocument) << "byte " << at;
+  }
+}
+
+TEST_F(Published, OnlySchema1HasNoDigest) {
+  const std::string sound = manifests::read_file(version_ / "dataset.json");
+  const std::string plain = read_dataset_document(version_).dump(2);
+  manifests::write_file_atomically(version_ / "dataset.json", plain);
+  EXPECT_THAT(message([&] { PublishedDataset{version_}; }), HasSubstr("got no digest at its end"));
+  std::string old = plain;
+  old.replace(old.find("\"schema\": 2"), 11, "\"schema\": 1");
+  manifests::write_file_atomically(version_ / "dataset.json", old);
+  EXPECT_EQ(read_dataset_manifest(version_).schema, 1);
+}
+
+TEST_F(Published, RefusesShardsOutsideItsFolder) {
+  std::string name = "shards/000001.h5";
+  for (const char* other :
+       {"/etc/shadow", "../000001.h5", "shards/../../000001.h5", "shards//etc/shadow", "shards\\\\..\\\\a.h5",
+        "shards/a\\u0000.h5", "shards/.h5", "shards", "000001.h5", ""}) {
+    replace("\"" + name + "\"", "\"" + std::string(other) + "\"");
+    EXPECT_THAT(message([&] { verify(version_, true); }), HasSubstr("the list of shards names \"")) << other;
+    name = other;
+  }
 }
 
 TEST_F(Published, KnowsRoleLabelAndPlaceOfACandidate) {

@@ -6,6 +6,7 @@
 
 #include "manifests/atomic_file.h"
 #include "manifests/digest.h"
+#include "manifests/sealed_json.h"
 #include "manifests/trust.h"
 #include "tests/pipeline/exports/body_samples.h"
 
@@ -68,7 +69,7 @@ json empty_document(const std::string& name) {
 }  // namespace
 
 void BodyDataset::write_document() const {
-  manifests::write_file_atomically(folder / "dataset.json", document.dump());
+  manifests::write_file_atomically(folder / "dataset.json", manifests::seal_json(document));
 }
 
 BodyDataset make_body_dataset(const fs::path& out, const std::string& name,

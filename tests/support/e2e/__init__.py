@@ -13,10 +13,10 @@ __main__.py, which also tells it where the program is. The parts:
 
 from .case import Case
 from .datasets import (copy_folder, digests, file_sha256, flip_bit, journal_lines, kept, latest, read_byte_column,
-                       read_csv, read_safetensors, read_samples, split_safetensors, stamps, units_in_journals,
-                       verdicts, write_safetensors)
+                       read_csv, read_safetensors, read_samples, seal_json, split_safetensors, stamps,
+                       units_in_journals, verdicts, write_safetensors)
 from .pictures import (FOCAL, draw_pictures, give_bodies, make_network, prima_dataset, render_world, smooth_picture,
                        world_animal3d, world_body, world_superanimal, write_annotations, write_json)
-from .program import (LIMIT_S, Fault, alarm_seconds, fault_lines, kill_and_resume, program, run, run_json, started,
+from .program import (LIMIT_S, Fault, alarm_seconds, command, environment, fault_lines, kill_and_resume, program, run, run_json, started,
                       wait_until)
 from .scene import PICTURES, UNIT, Scene

@@ -46,6 +46,13 @@ def stamps(paths):
     return {path: (path.stat().st_ino, path.stat().st_mtime_ns) for path in paths}
 
 
+def seal_json(document):
+    """The text of a document that ends with the digest over itself, as the program writes dataset.json."""
+    document.pop("digest", None)
+    body = json.dumps(document, indent=2).removesuffix("\n}") + ",\n"
+    return body + f'  "digest": "{hashlib.sha256(body.encode()).hexdigest()}"\n}}\n'
+
+
 def copy_folder(source, target):
     """Copies a folder with its links as links, such as an output folder with `latest`."""
     return shutil.copytree(source, target, symlinks=True)
