@@ -9,6 +9,8 @@
 #include <system_error>
 #include <utility>
 
+#include "manifests/durability.h"
+
 namespace q3d::manifests {
 
 namespace {
@@ -106,8 +108,17 @@ void FileDescriptor::read_at(std::uint64_t offset, std::span<std::byte> bytes) c
 }
 
 void FileDescriptor::sync() const {
+  if (!durability().syncs) return;
   while (::fsync(descriptor_) != 0) {
-    if (errno != EINTR) throw_errno("sync", path_);
+    if (errno == EINTR) continue;
+    const int code = errno;
+    if (code != EINVAL && code != ENOTSUP && code != ENOSYS) throw_errno("sync", path_);
+    throw IoError(
+        "sync", path_,
+        std::generic_category().message(code) +
+            ". This file system cannot say when a file has reached the disk. Choose a folder on another "
+            "one, or give --no-sync: then a power cut may lose finished work",
+        code);
   }
 }
 

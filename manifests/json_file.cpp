@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "manifests/json_keys.h"
 #include "manifests/text_file.h"
 
 namespace q3d::manifests {
@@ -67,7 +68,9 @@ nlohmann::json read_json_file(const std::filesystem::path& file) {
   std::string text = read_text_file(file, "an annotation file in JSON");
   mask_numbers_beyond_json(text);
   try {
-    return nlohmann::json::parse(text);
+    return nlohmann::json::parse(text, refuse_repeated_keys<nlohmann::json>());
+  } catch (const RepeatedKey& error) {
+    throw std::runtime_error(fmt::format("{}: {}", file.string(), error.what()));
   } catch (const nlohmann::json::parse_error& error) {
     const std::size_t at = std::min(error.byte, text.size());
     const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n');

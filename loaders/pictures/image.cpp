@@ -95,7 +95,8 @@ FileBytes read_picture_file(const std::filesystem::path& path) {
     if (size > kMaxFileBytes) {
       return {{},
               Reason::image_too_large,
-              fmt::format("{}: got {} bytes, expected at most {}", path.string(), size, kMaxFileBytes)};
+              fmt::format("{}: got {} bytes, expected at most {}", path.filename().string(), size,
+                          kMaxFileBytes)};
     }
     FileBytes content;
     content.bytes.resize(size);
@@ -104,7 +105,7 @@ FileBytes read_picture_file(const std::filesystem::path& path) {
   } catch (const manifests::IoError& error) {
     if (!error.names_no_file()) throw;
     const Reason reason = error.code() == EISDIR ? Reason::image_not_an_image : Reason::image_missing;
-    return {{}, reason, fmt::format("{}: {}", path.string(), error.reason())};
+    return {{}, reason, fmt::format("{}: {}", path.filename().string(), error.reason())};
   }
 }
 
@@ -124,7 +125,7 @@ DecodedImage decode_image(const std::filesystem::path& path) {
   FileBytes file = read_picture_file(path);
   if (file.failure != Reason::none) return {{}, file.failure, std::move(file.detail)};
   DecodedImage decoded = decode_image(file.bytes);
-  if (decoded.failure != Reason::none) decoded.detail = path.string() + ": " + decoded.detail;
+  if (decoded.failure != Reason::none) decoded.detail = path.filename().string() + ": " + decoded.detail;
   return decoded;
 }
 
@@ -145,7 +146,7 @@ DecodedMask decode_mask(const std::filesystem::path& path) {
   FileBytes file = read_picture_file(path);
   if (file.failure != Reason::none) return {{}, MaskKind::absent, file.failure, std::move(file.detail)};
   DecodedMask decoded = decode_mask(file.bytes);
-  if (decoded.failure != Reason::none) decoded.detail = path.string() + ": " + decoded.detail;
+  if (decoded.failure != Reason::none) decoded.detail = path.filename().string() + ": " + decoded.detail;
   return decoded;
 }
 

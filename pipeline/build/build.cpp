@@ -58,7 +58,7 @@ BuildSummary build(const config::BuildConfig& config, const run::RunOptions& opt
   stages::write_build_plan(options.out, summary.plan);
   summary.folder = version_folder(options.out, config, keys);
   summary.notes = workspace.ingest().notes;
-  summary.was_up_to_date = is_published(summary.folder, keys, workspace.digests());
+  summary.was_up_to_date = is_published(summary.folder, keys);
   workspace.digests().save();
   const auto seconds = [&] {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

@@ -119,7 +119,7 @@ DryRun dry_run(const config::BuildConfig& config, const run::RunOptions& options
   result.version = stages::version_name(config.name, plan.keys);
   result.candidates = plan.candidates;
   result.units = static_cast<std::int64_t>(plan.units.size());
-  result.is_up_to_date = is_published(options.out / result.version, plan.keys, workspace.digests());
+  result.is_up_to_date = is_published(options.out / result.version, plan.keys);
   result.stages = Forecaster(options.out, workspace.ingest(), plan).all();
   return result;
 }

@@ -1,13 +1,19 @@
 #include "pipeline/build/publish.h"
 
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
 
 #include <optional>
 #include <stdexcept>
+#include <string>
 
 #include "manifests/atomic_file.h"
+#include "manifests/csv_formula.h"
+#include "manifests/digest.h"
+#include "manifests/file_descriptor.h"
 #include "manifests/link_file.h"
 #include "manifests/sealed_json.h"
+#include "pipeline/run/interrupt.h"
 #include "pipeline/run/log.h"
 #include "pipeline/stages/build_plan.h"
 
@@ -29,6 +35,7 @@ std::vector<dataset::ShardEntry> link_shards(const fs::path& folder, const candi
     manifests::link_or_copy(shards.file(unit), folder / name);
     entries.push_back({name, entry->sha256, entry->bytes, entry->rows, unit.index});
   }
+  manifests::sync_folder(folder / "shards");
   return entries;
 }
 
@@ -49,6 +56,38 @@ void check_sums(const candidates::Ingest& ingest, const std::vector<manifests::J
   }
 }
 
+// Names come from annotation files, and verdicts.csv may be opened in a spreadsheet.
+void warn_of_formulas(const candidates::Ingest& ingest, const std::vector<manifests::Judgement>& judgements) {
+  std::int64_t cells = 0;
+  for (std::size_t i = 0; i < judgements.size(); ++i) {
+    const manifests::SampleRecord& record = ingest.candidates[i].record;
+    for (const std::string* cell : {&record.id, &record.dataset, &record.split, &record.source,
+                                    &record.species, &judgements[i].detail}) {
+      cells += manifests::looks_like_formula(*cell) ? 1 : 0;
+    }
+  }
+  if (cells == 0) return;
+  run::log_warning(fmt::format(
+      "{} cells of verdicts.csv begin with =, +, - or @, so that a spreadsheet may run them as formulas; "
+      "import the file with all columns as text",
+      cells));
+}
+
+struct ListedFile {
+  fs::path path;
+  std::string expected;            // SHA-256
+  std::optional<std::string> got;  // of the bytes; nothing if there is no such file
+};
+
+std::optional<std::string> digest_if_present(const fs::path& file) {
+  try {
+    return manifests::sha256_file(file);
+  } catch (const manifests::IoError& error) {
+    if (error.names_no_file()) return std::nullopt;
+    throw;
+  }
+}
+
 // What dataset.json says; nothing, and a warning, if it is not as it was written.
 std::optional<dataset::DatasetManifest> read_undamaged(const fs::path& folder) {
   try {
@@ -66,7 +105,7 @@ fs::path version_folder(const fs::path& out, const config::BuildConfig& config,
   return out / stages::version_name(config.name, keys);
 }
 
-bool is_published(const fs::path& folder, const stages::StageKeys& keys, manifests::DigestCache& digests) {
+bool is_published(const fs::path& folder, const stages::StageKeys& keys) {
   if (!fs::exists(folder / "dataset.json")) return false;
   const std::optional<dataset::DatasetManifest> manifest = read_undamaged(folder);
   if (!manifest) return false;
@@ -76,16 +115,22 @@ bool is_published(const fs::path& folder, const stages::StageKeys& keys, manifes
                     "written over. Build into another folder",
                     folder.string(), manifest->key, keys.dataset));
   }
+  std::vector<ListedFile> files;
+  for (const dataset::ShardEntry& shard : manifest->shards)
+    files.push_back({folder / shard.file, shard.sha256});
+  files.push_back({folder / "verdicts.csv", manifest->verdicts_sha256});
+  tbb::parallel_for(std::size_t{0}, files.size(), [&](std::size_t i) {
+    if (!run::interrupted()) files[i].got = digest_if_present(files[i].path);
+  });
+  run::throw_if_interrupted();
   bool is_sound = true;
-  const auto compare = [&](const fs::path& file, const std::string& expected) {
-    const auto got = digests.digest_if_present(file);
-    if (got == expected) return;
+  for (const ListedFile& file : files) {
+    if (file.got == file.expected) continue;
     is_sound = false;
     run::log_warning(fmt::format("{}: damaged: {}, expected {} by dataset.json; it is published again",
-                                 file.string(), got ? "got SHA-256 " + *got : "it is gone", expected));
-  };
-  for (const dataset::ShardEntry& shard : manifest->shards) compare(folder / shard.file, shard.sha256);
-  compare(folder / "verdicts.csv", manifest->verdicts_sha256);
+                                 file.path.string(), file.got ? "got SHA-256 " + *file.got : "it is gone",
+                                 file.expected));
+  }
   return is_sound;
 }
 
@@ -95,9 +140,11 @@ void publish(const fs::path& folder, const dataset::DatasetInputs& inputs,
   const std::vector<dataset::ShardEntry> entries = link_shards(folder, ingest, shards);
   check_sums(ingest, judgements, entries);
   const std::string csv = dataset::verdicts_csv(ingest, judgements);
+  warn_of_formulas(ingest, judgements);
   manifests::write_file_atomically(folder / "verdicts.csv", csv);
   const std::string document = dataset::dataset_json(inputs, judgements, entries, manifests::sha256(csv));
   manifests::write_file_atomically(folder / "dataset.json", document);
+  manifests::sync_folder(folder.parent_path());
 }
 
 void point_latest(const fs::path& out, const fs::path& folder) {
@@ -105,6 +152,7 @@ void point_latest(const fs::path& out, const fs::path& folder) {
   fs::remove(temporary);
   fs::create_directory_symlink(folder.filename(), temporary);
   fs::rename(temporary, out / "latest");
+  manifests::sync_folder(out);
 }
 
 }  // namespace q3d::pipeline::build

@@ -14,20 +14,18 @@ std::filesystem::path version_folder(const std::filesystem::path& out, const con
                                      const stages::StageKeys& keys);
 
 // True when the folder holds a complete dataset of this key: dataset.json, and verdicts.csv and every shard
-// with the digests that dataset.json lists. Digests come from the cache, so files that have not changed since
-// are not read again; a file that changed while its size, mtime and inode stayed is for `verify` to find.
-// A warning names every file that is gone or damaged. Throws std::runtime_error when the folder holds a
-// dataset of another key, and manifests::IoError.
-bool is_published(const std::filesystem::path& folder, const stages::StageKeys& keys,
-                  manifests::DigestCache& digests);
+// with the digests that dataset.json lists. All of them are read, so that no damaged dataset is called up to
+// date. A warning names every file that is gone or damaged. Throws std::runtime_error when the folder holds a
+// dataset of another key, manifests::IoError, and Interrupted.
+bool is_published(const std::filesystem::path& folder, const stages::StageKeys& keys);
 
 // Links the shards into `folder`, where each replaces an older file of its name, writes verdicts.csv and,
-// last, dataset.json. Throws std::runtime_error when the verdicts do not add up to the candidates or a unit
-// has no shard.
+// last, dataset.json. When it returns, all of it has reached the disk. Throws std::runtime_error when the
+// verdicts do not add up to the candidates or a unit has no shard.
 void publish(const std::filesystem::path& folder, const dataset::DatasetInputs& inputs,
              const std::vector<manifests::Judgement>& judgements, stages::StageStore& shards);
 
-// Makes <out>/latest a link to the version's folder, in one step.
+// Makes <out>/latest a link to the version's folder, in one step, and durable.
 void point_latest(const std::filesystem::path& out, const std::filesystem::path& folder);
 
 }  // namespace q3d::pipeline::build

@@ -37,8 +37,8 @@ UnitBuilder::UnitBuilder(const config::BuildConfig& config, const config::Judgin
                  .measures = makes(Stage::measure)},
                 static_cast<std::int64_t>(workspace.ingest().candidates.size()),
                 static_cast<std::int64_t>(workspace.ingest().units.size()), workspace.quiet()) {
-  // Measurements go by the labels' digest, because a vetoed candidate is not measured. Without pseudo labels there
-    // is no key.
+  // Measurements go by the labels' digest, because a vetoed candidate is not measured. Without pseudo labels
+  // there is no key.
   if (!keys.measure.empty() && makes(Stage::measure)) {
     measurements_.emplace(workspace.out(), "measure", keys.measure, &candidates::Unit::label_digest);
   }

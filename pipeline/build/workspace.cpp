@@ -4,6 +4,7 @@
 
 #include <thread>
 
+#include "manifests/atomic_file.h"
 #include "pipeline/leakage/exclusions.h"
 #include "pipeline/network/torch_bodies.h"
 #include "pipeline/network/torch_network.h"
@@ -52,6 +53,7 @@ Workspace::Workspace(const config::BuildConfig& config, const run::RunOptions& o
       device_key_(config::needs_network(config) ? network::device_key(config.network) : std::string()),
       origins_(read_origins(config)),
       ingest_(candidates::ingest(config, digests_, network::load_body_meshes)) {
+  if (!scratch_) manifests::remove_temporaries(options.out);  // what a run that was killed left
   leakage::leave_out(config, digests_, scratch_ ? scratch_->folder() : options.out, options.quiet, ingest_);
   if (!options_.quiet) {
     run::log_info(fmt::format("{} in {}",

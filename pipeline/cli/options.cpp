@@ -2,6 +2,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "manifests/durability.h"
+
 namespace q3d::pipeline::cli {
 
 std::vector<std::string> ConfigArguments::settings() const {
@@ -36,6 +38,18 @@ CLI::Option* device_option(CLI::App& command, ConfigArguments& config) {
 }
 
 CLI::Option* out_option(CLI::App& command, std::filesystem::path& out, const std::string& text) {
+  const auto without = [](bool manifests::Durability::*part) {
+    return [part] {
+      manifests::Durability wanted = manifests::durability();
+      wanted.*part = false;
+      manifests::set_durability(wanted);
+    };
+  };
+  command.add_flag_callback(
+      "--no-sync", without(&manifests::Durability::syncs),
+      "do not wait until files have reached the disk, for file systems that cannot sync");
+  command.add_flag_callback("--no-lock", without(&manifests::Durability::locks),
+                            "do not lock the output folder, for file systems that have no locks");
   return command.add_option("-o,--out", out, text);
 }
 

@@ -31,7 +31,7 @@ CLI::Option* config_option(
     const std::string& text = "JSON config file; keys of a later file replace those of an earlier one");
 // --device: the device of the config's network.
 CLI::Option* device_option(CLI::App& command, ConfigArguments& config);
-// -o,--out: a path. Not required unless the caller says so.
+// -o,--out: a path, and how it is written: --no-sync, --no-lock. Not required unless the caller says so.
 CLI::Option* out_option(CLI::App& command, std::filesystem::path& out, const std::string& text);
 // -t,--threads: a number, 0 or more.
 CLI::Option* threads_option(

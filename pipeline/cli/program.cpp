@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "manifests/file_descriptor.h"
+#include "pipeline/cli/standard_streams.h"
 #include "pipeline/cli/stderr_log.h"
 #include "pipeline/cli/usage.h"
 #include "pipeline/run/errors.h"
@@ -36,6 +37,12 @@ const char* advice(int code) {
     case EMFILE:
     case ENFILE:
       return " (raise the limit of open files, `ulimit -n`)";
+    case EINVAL:  // the message itself says what to do
+    case ELOOP:
+    case ENOLCK:
+    case ENOSYS:
+    case ENOTSUP:
+      return "";
     case ENOMEM:
       return " (free some memory)";
     case ENOSPC:
@@ -106,6 +113,7 @@ CLI::App* declare(CLI::App& app, std::string_view name) {
 }
 
 int run_program(int argc, char** argv, std::span<const CommandEntry> entries) {
+  prepare_standard_streams();
   cv::setNumThreads(1);  // the flow graph's threads are the only ones
   run::install_interrupt_handlers();
   const std::vector<std::string> words = with_help_expanded({argv, argv + argc});
@@ -116,7 +124,9 @@ int run_program(int argc, char** argv, std::span<const CommandEntry> entries) {
   StderrLog log;
   const run::LogTo to_stderr(log);
   try {
-    return parse_and_run(words, entries);
+    const int code = parse_and_run(words, entries);
+    finish_stdout();
+    return code;
   } catch (const run::Interrupted&) {
     fmt::print(stderr, "stopped; run the same command to continue\n");
     return kInterrupted;

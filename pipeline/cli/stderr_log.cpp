@@ -1,10 +1,9 @@
 #include "pipeline/cli/stderr_log.h"
 
 #include <fmt/format.h>
-
 #include <cstdio>
 
-#include "pipeline/run/terminal.h"
+#include "pipeline/run/printable.h"
 
 namespace q3d::pipeline::cli {
 namespace {
@@ -23,10 +22,9 @@ std::string_view prefix(run::LogLevel level) {
 
 }  // namespace
 
-StderrLog::StderrLog() : terminal_(run::terminal_of_stderr().redraws) {}
-
 void StderrLog::write(run::LogLevel level, std::string_view line) {
-  fmt::print(stderr, "{}{}{}\n", terminal_ ? "\r\033[K" : "", prefix(level), line);
+  run::erase_terminal_line();
+  fmt::print(stderr, "{}{}\n", prefix(level), run::printable_line(line));
 }
 
 }  // namespace q3d::pipeline::cli

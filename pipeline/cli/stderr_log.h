@@ -6,14 +6,10 @@
 namespace q3d::pipeline::cli {
 
 // Writes "LINE", "note: LINE" or "warning: LINE". On a terminal it first clears the progress line, which
-// draws itself again below.
+// draws itself again below. A line stays one line, whatever is in it.
 class StderrLog : public run::LogSink {
  public:
-  StderrLog();
   void write(run::LogLevel level, std::string_view line) override;
-
- private:
-  bool terminal_;
 };
 
 }  // namespace q3d::pipeline::cli

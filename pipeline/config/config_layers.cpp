@@ -6,6 +6,7 @@
 
 #include "manifests/atomic_file.h"
 #include "manifests/file_descriptor.h"
+#include "manifests/json_keys.h"
 #include "manifests/spelling.h"
 #include "pipeline/config/config_override.h"
 #include "pipeline/config/json_depth.h"
@@ -19,8 +20,11 @@ namespace fs = std::filesystem;
 
 json read_json(const fs::path& file) {
   try {
-    return json::parse(manifests::read_file(file), refuse_depth(file.string()), true,
+    return json::parse(manifests::read_file(file),
+                       manifests::refuse_repeated_keys<json>(refuse_depth(file.string())), true,
                        /*ignore_comments=*/true);
+  } catch (const manifests::RepeatedKey& error) {
+    throw run::ConfigError(fmt::format("{}: {}", file.string(), error.what()));
   } catch (const json::exception& error) {  // also numbers beyond double, which are no parse_error
     throw run::ConfigError(fmt::format("{}: not valid JSON: {}", file.string(), error.what()));
   } catch (const manifests::IoError& error) {

@@ -52,6 +52,7 @@ class ShardWriter {
  public:
   ShardWriter(const fs::path& folder, DerivedVersion& result) : folder_(folder), result_(result) {
     fs::create_directories(folder_ / "shards");
+    manifests::remove_temporaries(folder_);  // what a run that was killed left
     manifests::remove_temporaries(folder_ / "shards");
   }
 
@@ -156,7 +157,9 @@ DerivedVersion write_derived(const fs::path& out, const std::string& name, const
                                   {"bytes", entry.bytes},
                                   {"sha256", entry.sha256}});
   }
+  manifests::sync_folder(result.folder / "shards");
   manifests::write_file_atomically(result.folder / "dataset.json", manifests::seal_json(document));
+  manifests::sync_folder(out);
   return result;
 }
 

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <thread>
 
+#include "manifests/atomic_file.h"
 #include "manifests/lock.h"
 #include "pipeline/leakage/leakage.h"
 #include "pipeline/leakage/leakage_lists.h"
@@ -20,6 +21,7 @@ LeakageRunSummary run_leakage(const config::BuildConfig& config, const run::RunO
                                         : std::max<std::size_t>(1, std::thread::hardware_concurrency()));
   std::filesystem::create_directories(options.out);
   const manifests::FolderLock lock(options.out);
+  manifests::remove_temporaries(options.out);  // what a run that was killed left
   manifests::DigestCache digests(options.out / "digests.txt");
   const candidates::Ingest pool = candidates::ingest(config, digests, /*load_bodies=*/{});
   const LeakageReport report =

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <utility>
 
+#include "pipeline/run/printable.h"
 #include "pipeline/run/terminal.h"
 
 namespace q3d::pipeline::run {
@@ -60,8 +61,8 @@ void Progress::draw(bool last) {
   state_.is_last = last;
   if (terminal_) {
     const Terminal terminal = terminal_of_stderr();
-    fmt::print(stderr, "\r\033[K{}{}", progress_bar(state_, terminal.columns, terminal.has_colour),
-               last ? "\n" : "");
+    erase_terminal_line();
+    fmt::print(stderr, "{}{}", progress_bar(state_, terminal.columns, terminal.has_colour), last ? "\n" : "");
   } else {
     fmt::print(stderr, "{}\n", progress_line(state_));
   }

@@ -25,7 +25,7 @@ using nlohmann::json;
 
 // Raise a number when a change of the code changes what the stage writes.
 constexpr int kIngestCode = 3;
-constexpr int kPredictCode = 3;
+constexpr int kPredictCode = 4;
 constexpr int kFidelityCode = 2;
 constexpr int kRefineCode = 2;
 constexpr int kMeasureCode = 2;
@@ -238,6 +238,9 @@ void open_stage_folder(const std::filesystem::path& folder, const std::string& s
                                  manifest.string(), key));
   }
   manifests::write_file_atomically(manifest, json{{"stage", stage}, {"key", key}}.dump(2) + "\n");
+  // The names of the folders that were made, up to the one that the user gave.
+  manifests::sync_folder(folder.parent_path());
+  manifests::sync_folder(folder.parent_path().parent_path());
 }
 
 }  // namespace q3d::pipeline::stages

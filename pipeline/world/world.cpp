@@ -1,17 +1,20 @@
 #include "pipeline/world/world.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
 #include <array>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <vector>
 
 #include "manifests/atomic_file.h"
+#include "manifests/durability.h"
+#include "manifests/file_descriptor.h"
 #include "manifests/lock.h"
 #include "pipeline/animal/synthetic_files.h"
 #include "pipeline/world/annotations.h"
@@ -78,13 +81,6 @@ void clear_unfinished(const fs::path& out) {
     fs::remove_all(out / folder);
   }
   manifests::write_file_atomically(marker, "a killed run of the world's renderer is made anew\n");
-}
-
-void write_bytes(const fs::path& path, const std::vector<std::uint8_t>& bytes) {
-  std::ofstream file(path, std::ios::binary);
-  file.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  file.close();
-  if (!file) throw std::runtime_error("world: cannot write " + path.string());
 }
 
 void write_json(const fs::path& path, const nlohmann::json& content) {
@@ -198,6 +194,7 @@ WorldSummary make_world(const WorldOptions& options) {
   check(options);
   fs::create_directories(options.out);
   const manifests::FolderLock lock(options.out);
+  manifests::remove_temporaries(options.out);
   const fs::path asset =
       options.asset.empty() ? options.out / "assets" / "smal_synthetic.safetensors" : options.asset;
   if (const auto pictures = finished_world(options)) {
@@ -214,6 +211,7 @@ WorldSummary make_world(const WorldOptions& options) {
   save_priors(options.out);
   WorldSummary summary = run.all();
   summary.asset = asset;
+  manifests::sync_file_system(options.out);
   write_json(options.out / "world.json", {{"options", options_of(options)}, {"pictures", summary.pictures}});
   fs::remove(options.out / kUnfinished);
   return summary;

@@ -204,8 +204,9 @@ void write_all(int fd, const void* data, std::size_t bytes) {
 
 // The steps of manifests/atomic_file.h, which this room does not see: it links no other room than smal.
 void write_file(const std::filesystem::path& path, const NamedTensors& tensors, const std::string& header) {
-  std::string temporary = path.string() + ".XXXXXX";
-  FileDescriptor file(::mkstemp(temporary.data()));
+  constexpr std::string_view kEnding = ".tmp";  // as manifests::remove_temporaries knows it
+  std::string temporary = path.string() + ".XXXXXX" + std::string(kEnding);
+  FileDescriptor file(::mkstemps(temporary.data(), static_cast<int>(kEnding.size())));
   if (file.get() < 0)
     throw std::runtime_error("cannot create a temporary file beside it: " + system_reason());
   try {

@@ -2,13 +2,18 @@
 // error, or stop the program at an exact point, without waiting for the right moment.
 //
 // The environment says what happens:
-//   Q3D_FAULT_PATH    text that the file's path contains; without it this library changes nothing
+//   Q3D_FAULT_PATH    text that the file's path contains, or with which it ends if the text ends in "$"; without it
+//                     this library changes nothing
 //   Q3D_FAULT_CALL    the kind of call: open (open, openat, fopen), read (read, pread),
-//                     stat (stat, lstat, fstatat) or sync (fsync, fdatasync)
+//                     stat (stat, lstat, fstatat), sync (fsync, fdatasync, syncfs), write, rename, link (link,
+//                     symlink), lock (flock), or change: any of sync, write, rename and link
 //   Q3D_FAULT_SKIP    how many matching calls pass unharmed before the fault begins (default 0)
 //   Q3D_FAULT_ACTION  fail: this call and all later ones fail with Q3D_FAULT_ERRNO (default)
 //                     stop: the process stops itself (SIGSTOP), once; after SIGCONT the call is made
 //                     hang: this call and all later ones never return
+//                     kill: the process kills itself (SIGKILL) before the call; of a write, one half is made
+//                     count: nothing, but when the process exits, a line says how many calls there were:
+//                     "faults: counted NUMBER calls"
 //   Q3D_FAULT_ERRNO   EIO (default), ESTALE, EMFILE, ENOMEM or a number
 //
 // Every fault is announced by a line on stderr, "faults: ACTION at CALL of PATH", so that a test can tell
@@ -24,7 +29,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/stat.h>
+#include <sys/syscall.h>
 #include <sys/types.h>
 #include <unistd.h>
 
@@ -68,7 +75,44 @@ __attribute__((constructor)) static void read_settings(void) {
 static void announce(const char* call, const char* path) {
   char line[4400];
   const int length = snprintf(line, sizeof line, "faults: %s at %s of %.4096s\n", fault_action, call, path);
-  const ssize_t written = write(STDERR_FILENO, line, (size_t)length);
+  const long written = syscall(SYS_write, STDERR_FILENO, line, (size_t)length);
+  (void)written;
+}
+
+// The write that this thread is about to make, so that a process can be killed in the middle of it.
+static _Thread_local struct {
+  int descriptor;
+  const void* bytes;
+  size_t size;
+} open_write;
+
+static void kill_this_process(void) {
+  if (open_write.bytes != NULL) {
+    const long written = syscall(SYS_write, open_write.descriptor, open_write.bytes, open_write.size / 2);
+    (void)written;
+  }
+  kill(getpid(), SIGKILL);
+  for (;;) pause();
+}
+
+static int is_chosen_path(const char* path) {
+  const size_t wanted = strlen(fault_path);
+  if (wanted == 0 || fault_path[wanted - 1] != '$') return strstr(path, fault_path) != NULL;
+  const size_t size = strlen(path);
+  return size + 1 >= wanted && strncmp(path + size + 1 - wanted, fault_path, wanted - 1) == 0;
+}
+
+static int is_chosen(const char* call) {
+  if (strcmp(fault_call, call) == 0) return 1;
+  return strcmp(fault_call, "change") == 0 && (strcmp(call, "sync") == 0 || strcmp(call, "write") == 0 ||
+                                               strcmp(call, "rename") == 0 || strcmp(call, "link") == 0);
+}
+
+__attribute__((destructor)) static void tell_count(void) {
+  if (fault_path == NULL || strcmp(fault_action, "count") != 0) return;
+  char line[64];
+  const int length = snprintf(line, sizeof line, "faults: counted %ld calls\n", (long)calls_seen);
+  const long written = syscall(SYS_write, STDERR_FILENO, line, (size_t)length);
   (void)written;
 }
 
@@ -76,9 +120,9 @@ static void announce(const char* call, const char* path) {
 // then set.
 static int strikes(const char* call, const char* path) {
   if (fault_path == NULL || path == NULL) return 0;
-  if (strcmp(call, fault_call) != 0 || strstr(path, fault_path) == NULL) return 0;
+  if (!is_chosen(call) || !is_chosen_path(path)) return 0;
   const long before = atomic_fetch_add(&calls_seen, 1);
-  if (before < fault_skip) return 0;
+  if (before < fault_skip || strcmp(fault_action, "count") == 0) return 0;
   if (strcmp(fault_action, "stop") == 0) {
     if (before > fault_skip) return 0;
     announce(call, path);
@@ -86,13 +130,14 @@ static int strikes(const char* call, const char* path) {
     return 0;
   }
   announce(call, path);
+  if (strcmp(fault_action, "kill") == 0) kill_this_process();
   while (strcmp(fault_action, "hang") == 0) pause();
   errno = fault_errno;
   return 1;
 }
 
 static int strikes_descriptor(const char* call, int descriptor) {
-  if (fault_path == NULL || strcmp(call, fault_call) != 0) return 0;
+  if (fault_path == NULL || !is_chosen(call)) return 0;
   char link[64];
   char path[4096];
   snprintf(link, sizeof link, "/proc/self/fd/%d", descriptor);
@@ -167,6 +212,37 @@ DEFINE_FSTATAT(fstatat, stat)
 DEFINE_FSTATAT(fstatat64, stat64)
 DEFINE_SYNC(fsync)
 DEFINE_SYNC(fdatasync)
+DEFINE_SYNC(syncfs)
+
+ssize_t write(int descriptor, const void* bytes, size_t size) {
+  NEXT(ssize_t, write, int, const void*, size_t);
+  open_write.descriptor = descriptor;
+  open_write.bytes = bytes;
+  open_write.size = size;
+  const int fails = strikes_descriptor("write", descriptor);
+  open_write.bytes = NULL;
+  return fails ? -1 : next(descriptor, bytes, size);
+}
+
+int rename(const char* from, const char* to) {
+  NEXT(int, rename, const char*, const char*);
+  return strikes("rename", to) ? -1 : next(from, to);
+}
+
+int link(const char* from, const char* to) {
+  NEXT(int, link, const char*, const char*);
+  return strikes("link", to) ? -1 : next(from, to);
+}
+
+int symlink(const char* target, const char* path) {
+  NEXT(int, symlink, const char*, const char*);
+  return strikes("link", path) ? -1 : next(target, path);
+}
+
+int flock(int descriptor, int operation) {
+  NEXT(int, flock, int, int);
+  return strikes_descriptor("lock", descriptor) ? -1 : next(descriptor, operation);
+}
 
 ssize_t read(int descriptor, void* buffer, size_t size) {
   NEXT(ssize_t, read, int, void*, size_t);

@@ -4,8 +4,11 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <array>
 #include <csignal>
 
+#include "manifests/atomic_file.h"
+#include "manifests/durability.h"
 #include "tests/support/paths.h"
 
 namespace q3d::manifests {
@@ -49,6 +52,25 @@ TEST(FolderLock, TheKernelDropsItWhenTheHolderIsKilled) {
   ::close(channel[0]);
   ::close(channel[1]);
   EXPECT_NO_THROW(FolderLock again(scratch.path()));
+}
+
+TEST(FolderLock, ALinkOfItsNameIsRefusedAndItsTargetStays) {
+  const testing::ScratchDir scratch;
+  write_file_atomically(scratch.path() / "victim", "precious");
+  std::filesystem::create_symlink("victim", scratch.path() / ".lock");
+  EXPECT_THAT(
+      [&] { FolderLock lock(scratch.path()); },
+      ThrowsMessage<IoError>(HasSubstr("it is a symbolic link, expected a file of the program's own")));
+  EXPECT_EQ(read_file(scratch.path() / "victim"), "precious");
+}
+
+TEST(FolderLock, IsNotTakenWhereTheUserWantsNone) {
+  const testing::ScratchDir scratch;
+  const FolderLock lock(scratch.path());
+  set_durability({.locks = false});
+  EXPECT_NO_THROW(FolderLock second(scratch.path()));
+  set_durability({});
+  EXPECT_THROW(FolderLock third(scratch.path()), std::runtime_error);
 }
 
 TEST(FolderLock, NamesAFolderThatIsAbsent) {

@@ -44,8 +44,10 @@ def run_json(*arguments, **options):
 
 @dataclasses.dataclass(frozen=True)
 class Fault:
-    """What tests/faults/faults.c does to calls of kind `call` ("open", "read", "stat", "sync") on files whose path
-    contains `path`, after `skip` of these passed: "fail" with the errno `error`, "stop" once, or "hang"."""
+    """What tests/faults/faults.c does to calls of kind `call` ("open", "read", "stat", "sync", "write", "rename",
+    "link", "lock", or "change": any of sync, write, rename and link) on files whose path contains `path`, or ends with
+    it if it ends in "$", after `skip` of these passed: "fail" with the errno `error`, "stop" once, "hang", "kill", or
+    only "count" them."""
 
     path: str
     call: str

@@ -1,0 +1,23 @@
+// What this process asks of the file system. Some cannot do it: network disks without locks, and those that
+// refuse to sync. The command line's --no-sync and --no-lock say that the user goes on without.
+#pragma once
+
+#include <filesystem>
+
+namespace q3d::manifests {
+
+struct Durability {
+  bool syncs = true;  // finished files reach the disk before anything is built on them
+  bool locks = true;  // a second build of the same folder is refused
+};
+
+// For the whole process; set it before the first file is written.
+void set_durability(Durability wanted);
+Durability durability();
+
+// Waits until everything that was written to the folder's file system has reached the disk, if
+// durability().syncs. One call takes less time than one for each of many files. Throws IoError
+// (manifests/file_descriptor.h).
+void sync_file_system(const std::filesystem::path& folder);
+
+}  // namespace q3d::manifests
