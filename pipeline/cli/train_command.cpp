@@ -22,6 +22,9 @@ struct Arguments {
 void print_summary(const training::TrainingSummary& summary) {
   fmt::print(stderr, "\n{} of {} steps done, {} of them now, in {}\n", summary.steps_done,
              summary.steps_total, summary.steps_here, run::human_duration(summary.seconds));
+  if (!summary.left_out.empty()) {
+    fmt::print(stderr, "  left out because of damage: {}\n", summary.left_out.size());
+  }
   if (summary.finished) {
     fmt::print(stderr, "  weights: {}\n", summary.model.string());
   } else {
@@ -33,7 +36,7 @@ nlohmann::ordered_json to_json(const training::TrainingSummary& summary) {
   return {{"steps_done", summary.steps_done}, {"steps_total", summary.steps_total},
           {"steps_here", summary.steps_here}, {"finished", summary.finished},
           {"last_loss", summary.last_loss},   {"model", summary.model.string()},
-          {"seconds", summary.seconds}};
+          {"left_out", summary.left_out},     {"seconds", summary.seconds}};
 }
 
 }  // namespace
@@ -52,6 +55,8 @@ Command add_train(CLI::App& app) {
       ->add_option("--max-steps", arguments->options.max_steps,
                    "save and stop after this many steps (0 = train to the end)")
       ->check(CLI::NonNegativeNumber);
+  command->add_flag("--skip-damaged", arguments->options.skip_damaged,
+                    "go on without damaged shards and samples; each is counted and named");
   json_flag(*command, arguments->json);
   quiet_flag(*command, arguments->options.quiet);
   command->footer(

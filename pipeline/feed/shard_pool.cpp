@@ -60,34 +60,46 @@ manifests::Keypoints read_keypoints(const TableReader& table, std::int64_t row) 
 
 }  // namespace
 
-ShardPool::ShardPool(std::string name, const std::vector<fs::path>& sources) : name_(std::move(name)) {
+std::vector<fs::path> shard_files(const std::vector<fs::path>& sources) {
+  std::vector<fs::path> files;
   for (const fs::path& source : sources) {
-    for (const fs::path& file : find_shards(source)) {
-      const manifests::ShardReader& shard = shards_.emplace_back(file);
-      if (shard.header().image_encoding == manifests::ImageEncoding::reference) {
-        throw std::runtime_error(fmt::format(
-            "{}: a shard without pictures; training needs one that was built with \"images\": \"jpeg\" or "
-            "\"png\"",
-            file.string()));
-      }
-      first_.push_back(first_.back() + shard.rows());
+    const std::vector<fs::path> found = find_shards(source);
+    files.insert(files.end(), found.begin(), found.end());
+  }
+  return files;
+}
+
+ShardPool::ShardPool(std::string name, const std::vector<fs::path>& sources) : name_(std::move(name)) {
+  for (const fs::path& file : shard_files(sources)) {
+    const manifests::ShardReader& shard = shards_.emplace_back(file);
+    if (shard.header().image_encoding == manifests::ImageEncoding::reference) {
+      throw std::runtime_error(fmt::format(
+          "{}: a shard without pictures; training needs one that was built with \"images\": \"jpeg\" or "
+          "\"png\"",
+          file.string()));
+    }
+    for (std::int64_t row = 0; row < shard.rows(); ++row) {
+      places_.push_back({static_cast<std::uint32_t>(shards_.size() - 1), static_cast<std::uint32_t>(row)});
     }
   }
 }
 
-std::vector<fs::path> ShardPool::files() const {
-  std::vector<fs::path> files;
-  for (const manifests::ShardReader& shard : shards_) files.push_back(shard.table().path());
-  return files;
+void ShardPool::leave_out(const std::vector<std::int64_t>& positions) {
+  const std::set<std::int64_t> left_out(positions.begin(), positions.end());
+  if (!left_out.empty() && (*left_out.begin() < 0 || *left_out.rbegin() >= size())) {
+    throw std::out_of_range(
+        fmt::format("pool {}: leave_out: a position outside its {} samples", name_, size()));
+  }
+  std::int64_t position = 0;
+  std::erase_if(places_, [&](const ShardAndRow&) { return left_out.contains(position++); });
 }
 
 ShardPool::Place ShardPool::locate(std::int64_t index) const {
   if (index < 0 || index >= size()) {
     throw std::out_of_range(fmt::format("pool {}: sample {} of {}", name_, index, size()));
   }
-  const auto next = std::upper_bound(first_.begin(), first_.end(), index);
-  const auto shard = static_cast<std::size_t>(next - first_.begin()) - 1;
-  return {&shards_[shard].table(), index - first_[shard]};
+  const ShardAndRow& place = places_[static_cast<std::size_t>(index)];
+  return {&shards_[place.shard].table(), place.row};
 }
 
 TrainingSample ShardPool::sample(std::int64_t index) const {

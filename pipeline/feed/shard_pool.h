@@ -31,17 +31,24 @@ struct TrainingSample {
   smal::Keypoints3d keypoints_3d{};
 };
 
+// The shards of a pool's sources, in the order of their samples. Each source is a shard, or a folder whose
+// *.h5 files, or those of its subfolder "shards", are taken in the order of their names. Throws
+// std::runtime_error naming the path when a source holds no shard.
+std::vector<std::filesystem::path> shard_files(const std::vector<std::filesystem::path>& sources);
+
 // Reads take no lock and may run in many threads.
 class ShardPool {
  public:
-  // Each source is a shard, or a folder whose *.h5 files, or those of its subfolder "shards", are taken in
-  // the order of their names. Throws std::runtime_error naming the path when a source holds no shard, a shard
-  // is not sound, or it only refers to pictures.
+  // Opens shard_files(sources). Throws std::runtime_error naming the path when a shard is not sound or only
+  // refers to pictures, and like shard_files.
   ShardPool(std::string name, const std::vector<std::filesystem::path>& sources);
 
+  // Takes samples out of the pool: those at these positions, which count as before the call. The later ones
+  // move up. Throws std::out_of_range.
+  void leave_out(const std::vector<std::int64_t>& positions);
+
   const std::string& name() const { return name_; }
-  std::int64_t size() const { return first_.back(); }
-  std::vector<std::filesystem::path> files() const;  // the shards, in the order of their samples
+  std::int64_t size() const { return static_cast<std::int64_t>(places_.size()); }
   // Throw std::out_of_range for a sample that the pool lacks and std::runtime_error when a shard cannot be
   // read.
   TrainingSample sample(std::int64_t index) const;
@@ -55,9 +62,13 @@ class ShardPool {
   };
   Place locate(std::int64_t index) const;
 
+  struct ShardAndRow {
+    std::uint32_t shard = 0;
+    std::uint32_t row = 0;
+  };
   std::string name_;
   std::vector<manifests::ShardReader> shards_;
-  std::vector<std::int64_t> first_{0};  // running number of each shard's first sample, and the total
+  std::vector<ShardAndRow> places_;  // of every sample
 };
 
 }  // namespace q3d::pipeline::feed

@@ -1,12 +1,9 @@
 #include "pipeline/training/training_log.h"
 
-#include <fmt/format.h>
+#include <fcntl.h>
 
-#include <cerrno>
-#include <cstring>
 #include <nlohmann/json.hpp>
 #include <sstream>
-#include <stdexcept>
 
 #include "manifests/atomic_file.h"
 
@@ -32,9 +29,7 @@ TrainingLog::TrainingLog(std::filesystem::path path, int phase, std::int64_t ste
     }
   }
   manifests::write_file_atomically(path_, kept);
-  file_.reset(std::fopen(path_.c_str(), "a"));
-  if (!file_)
-    throw std::runtime_error(fmt::format("{}: cannot open: {}", path_.string(), std::strerror(errno)));
+  file_ = manifests::FileDescriptor(path_, O_WRONLY | O_APPEND);
 }
 
 void TrainingLog::write(const LogLine& line) {
@@ -50,9 +45,11 @@ void TrainingLog::write(const LogLine& line) {
                                            {"samples_per_second", line.samples_per_second},
                                            {"seconds", line.seconds}};
   const std::string text = document.dump() + "\n";
-  if (std::fwrite(text.data(), 1, text.size(), file_.get()) != text.size() || std::fflush(file_.get()) != 0) {
-    throw std::runtime_error(fmt::format("{}: cannot write: {}", path_.string(), std::strerror(errno)));
-  }
+  file_.write_all(text);
+}
+
+void TrainingLog::sync() const {
+  file_.sync();
 }
 
 }  // namespace q3d::pipeline::training

@@ -2,12 +2,12 @@
 #pragma once
 
 #include <cstdint>
-#include <cstdio>
 #include <filesystem>
-#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
+
+#include "manifests/file_descriptor.h"
 
 namespace q3d::pipeline::training {
 
@@ -26,16 +26,14 @@ struct LogLine {
 class TrainingLog {
  public:
   // Keeps the lines of an earlier process up to (phase, step), so that steps which are repeated appear once.
-  // Throws std::runtime_error naming the path and the system's reason.
+  // Throws manifests::IoError, as all members do.
   TrainingLog(std::filesystem::path path, int phase, std::int64_t step);
   void write(const LogLine& line);
+  void sync() const;  // waits until the lines have reached the disk
 
  private:
-  struct Close {
-    void operator()(std::FILE* file) const { std::fclose(file); }
-  };
   std::filesystem::path path_;
-  std::unique_ptr<std::FILE, Close> file_;
+  manifests::FileDescriptor file_;
 };
 
 }  // namespace q3d::pipeline::training

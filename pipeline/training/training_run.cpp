@@ -31,6 +31,7 @@
 #include "pipeline/run/progress.h"
 #include "pipeline/training/rank_agreement.h"
 #include "pipeline/training/training_log.h"
+#include "pipeline/training/training_pools.h"
 #include "pipeline/training/training_state.h"
 #include "smal/camera.h"
 #include "smal/sizes.h"
@@ -156,14 +157,9 @@ std::shared_ptr<model::PrimaNet> initial_net(const TrainingNetworkConfig& networ
   return net;
 }
 
-std::vector<fs::path> paths(const PoolConfig& pool) {
-  return {pool.shards.begin(), pool.shards.end()};
-}
-
 // A digest over all that decides the weights, but for device and threads: effective settings, assets and
-// shards. `remember`: keep the files' digests in `out` for the next run.
-std::string run_key(const TrainingConfig& config, const fs::path& out, bool remember) {
-  manifests::DigestCache digests(out / "digests.txt");
+// samples. All files are read, because a run of days is worth it.
+std::string run_key(const TrainingConfig& config, const nlohmann::json& samples) {
   nlohmann::json assets = nlohmann::json::array();
   const TrainingNetworkConfig& network = config.network;
   if (!fs::exists(network.priors)) {
@@ -173,20 +169,9 @@ std::string run_key(const TrainingConfig& config, const fs::path& out, bool reme
         network.priors.string(), run::command_line({"init", "--priors", network.priors.string()})));
   }
   for (const fs::path& path : {network.initial, network.encoders, network.smal_asset, network.priors}) {
-    assets.push_back(path.empty() ? std::string() : digests.digest(path));
+    assets.push_back(path.empty() ? std::string() : manifests::sha256_file(path));
   }
-  nlohmann::json shards = nlohmann::json::object();  // by pool
-  for (const PhaseConfig& phase : config.phases) {
-    for (const PoolConfig& pool : phase.pools) {
-      if (shards.contains(pool.name)) continue;
-      nlohmann::json& list = shards[pool.name] = nlohmann::json::array();
-      for (const fs::path& file : feed::ShardPool(pool.name, paths(pool)).files()) {
-        list.push_back(digests.digest(file));
-      }
-    }
-  }
-  if (remember) digests.save();
-  return manifests::sha256(nlohmann::json{settings::deciding_values(config), assets, shards}.dump());
+  return manifests::sha256(nlohmann::json{settings::deciding_values(config), assets, samples}.dump());
 }
 
 model::TrainerOptions trainer_options(const TrainingConfig& config, const PhaseConfig& phase) {
@@ -235,11 +220,11 @@ std::uint64_t step_seed(const TrainingConfig& config, const TrainingPosition& po
 }
 
 feed::Feed open_feed(const TrainingConfig& config, const PhaseConfig& phase, int phase_index, int threads,
-                     const model::ranks::Collective& ranks) {
+                     const TrainingPools& samples, const model::ranks::Collective& ranks) {
   std::vector<feed::ShardPool> pools;
   std::vector<double> weights;
   for (const PoolConfig& pool : phase.pools) {
-    pools.emplace_back(pool.name, paths(pool));
+    pools.push_back(samples.open(pool.name));
     weights.push_back(pool.weight);
   }
   feed::FeedOptions options = config.feed;
@@ -265,12 +250,14 @@ class Run {
         lock_(leads() ? std::make_unique<manifests::FolderLock>(made(options.out)) : nullptr),
         asset_(smal::tensors::load_asset(config.network.smal_asset)),
         priors_(model::load_priors(smal::tensors::SafeTensors::open(config.network.priors), device_.device)),
-        key_(run_key(config, options.out, /*remember=*/leads())),
+        pools_(config.phases, options.skip_damaged),
+        key_(run_key(config, pools_.identity())),
         stored_(load_state(state_path(), key_)) {
     if (stored_) position_ = stored_->position;
     require_same_run(*ranks_, key_, position_);
     if (!leads()) return;
     manifests::remove_temporaries(options.out);
+    tell_left_out();
     if (options.quiet) return;
     if (!device_.warning.empty()) run::log_warning(device_.warning);
     if (config_.network.precision == Precision::bfloat16 && !model::bfloat16_is_fast(device_.device)) {
@@ -292,6 +279,7 @@ class Run {
   TrainingSummary run() {
     TrainingSummary summary;
     summary.rank = ranks_->rank();
+    summary.left_out = pools_.left_out();
     for (const PhaseConfig& phase : config_.phases) summary.steps_total += phase.steps;
     std::optional<TrainingLog> log;
     if (leads()) log.emplace(options_.out / "log.jsonl", position_.phase, position_.step);
@@ -311,6 +299,16 @@ class Run {
   }
 
  private:
+  void tell_left_out() const {
+    constexpr std::size_t kShown = 20;
+    const std::vector<std::string>& lines = pools_.left_out();
+    for (std::size_t i = 0; i < std::min(kShown, lines.size()); ++i)
+      run::log_warning("left out: " + lines[i]);
+    if (lines.size() > kShown) {
+      run::log_warning(fmt::format("left out: {} more, which --json names", lines.size() - kShown));
+    }
+  }
+
   // Rank 0 alone writes.
   bool leads() const { return ranks_->rank() == 0; }
 
@@ -321,7 +319,8 @@ class Run {
     return ranks_->sum(torch::tensor({run::interrupted() ? 1 : 0})).item<int>() > 0;
   }
 
-  void save(const model::Learner& learner) const {
+  void save(const model::Learner& learner, const std::optional<TrainingLog>& log) const {
+    if (log) log->sync();  // before the state, which says that these steps are done
     if (leads()) save_state(state_path(), learner, position_, key_);
     meet();  // a rank that ended earlier would make its launcher stop rank 0 while it writes
   }
@@ -361,25 +360,25 @@ class Run {
     sizes.ief_iterations = phase.ief_iterations;
     const auto net = model::with_config(*from, sizes);
     const int threads = options_.threads == 0 && place_.size > 1 ? own_cores(place_) : options_.threads;
-    const feed::Feed feed = open_feed(config_, phase, position_.phase, threads, *ranks_);
+    const feed::Feed feed = open_feed(config_, phase, position_.phase, threads, pools_, *ranks_);
     const std::unique_ptr<model::Learner> learner = make_learner(net, phase, feed);
     if (stored_ && position_.step > 0) learner->restore(stored_->file);
     stored_.reset();
     feed::FeedStream stream(feed, position_.step * feed.batch_size(), config_.feed_ahead);
     while (position_.step < phase.steps) {
       if (any_rank_interrupted()) {
-        save(*learner);
+        save(*learner, log);
         throw run::Interrupted("interrupted");
       }
       if (limit_reached(summary)) break;
       step(phase, *learner, feed, stream.next(), log, summary);
       progress.advance(1);
       if (position_.step % config_.checkpoint_every == 0 && position_.step < phase.steps) {
-        save(*learner);
+        save(*learner, log);
       }
     }
     if (position_.step == phase.steps) position_ = {position_.phase + 1, 0, {}};
-    save(*learner);
+    save(*learner, log);
     return net;
   }
 
@@ -440,6 +439,7 @@ class Run {
   std::unique_ptr<manifests::FolderLock> lock_;  // rank 0's
   smal::tensors::SmalAsset asset_;
   model::Priors priors_;
+  TrainingPools pools_;
   std::string key_;
   std::optional<StoredState> stored_;
   TrainingPosition position_;

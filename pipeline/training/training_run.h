@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "pipeline/training/settings/training_config.h"
 
@@ -14,6 +15,7 @@ struct TrainingOptions {
   int threads = 0;             // that prepare batches; 0 = all cores. Changes no bit
   std::int64_t max_steps = 0;  // of this call; then the state is saved and train() returns. 0 = no limit
   bool quiet = false;
+  bool skip_damaged = false;  // go on without damaged shards and records, which are then named
 };
 
 struct TrainingSummary {
@@ -22,9 +24,10 @@ struct TrainingSummary {
   bool finished = false;
   std::int64_t steps_here = 0;  // by this call
   double seconds = 0.0;
-  double last_loss = 0.0;       // of this call's last step
-  std::filesystem::path model;  // the weights, once finished
-  int rank = 0;                 // of this process; rank 0 reports
+  double last_loss = 0.0;             // of this call's last step
+  std::filesystem::path model;        // the weights, once finished
+  int rank = 0;                       // of this process; rank 0 reports
+  std::vector<std::string> left_out;  // damaged shards and records, one a line, with the reason
 };
 
 // Writes into `out`:
@@ -39,7 +42,8 @@ struct TrainingSummary {
 // of every batch. Rank 0 alone writes, into a folder that all can read. Throws ConfigError when `out` holds
 // another configuration's run or the ranks do not fit each other. Throws Interrupted on Ctrl-C, after saving
 // the state. Throws std::runtime_error when another rank is gone, and, naming the batch's sample ids, when
-// loss or gradient are not finite or the loss diverges; the newest state then stays as it is.
+// loss or gradient are not finite or the loss diverges; the newest state then stays as it is. Throws
+// std::runtime_error naming every damaged shard and record (TrainingPools), or the damaged state.
 TrainingSummary train(const settings::TrainingConfig& config, const TrainingOptions& options);
 
 }  // namespace q3d::pipeline::training

@@ -27,8 +27,9 @@ struct StoredState {
 void save_state(const std::filesystem::path& path, const model::Learner& learner,
                 const TrainingPosition& position, const std::string& key);
 
-// Nothing when there is no file. Throws ConfigError when it belongs to another key, std::runtime_error when
-// it is damaged.
+// Nothing when there is no file. Compares the file with the digest that it holds; a state of an earlier
+// version holds none, and a warning says so. Throws ConfigError when it belongs to another key,
+// std::runtime_error when it is damaged.
 std::optional<StoredState> load_state(const std::filesystem::path& path, const std::string& key);
 
 }  // namespace q3d::pipeline::training

@@ -3,10 +3,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <fstream>
-#include <limits>
+#include <functional>
 
 #include "manifests/atomic_file.h"
+#include "manifests/digest.h"
+#include "manifests/sealed_json.h"
 #include "model/checkpoint.h"
 #include "model/prima.h"
 #include "pipeline/run/errors.h"
@@ -55,6 +58,49 @@ class TrainingRun : public ::testing::Test {
 
   TrainingSummary run(const std::string& out, std::int64_t max_steps = 0, int threads = 1) const {
     return train(config_, {path(out), threads, max_steps, /*quiet=*/true});
+  }
+
+  static std::string message(const std::function<void()>& call) {
+    try {
+      call();
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+    return "nothing thrown";
+  }
+
+  static void flip_bit(const std::filesystem::path& file, std::size_t at) {
+    std::string content = manifests::read_file(file);
+    content.at(at) ^= 4;
+    manifests::write_file_atomically(file, content);
+  }
+
+  // A dataset with one shard for each sample of `counts`, and a run on it alone. Returns the shards.
+  std::vector<std::filesystem::path> train_on_dataset(const std::vector<int>& counts) {
+    nlohmann::ordered_json list = nlohmann::ordered_json::array();
+    std::vector<std::filesystem::path> shards;
+    std::filesystem::create_directories(path("set/shards"));
+    for (std::size_t i = 0; i < counts.size(); ++i) {
+      const std::string name = "shards/00000" + std::to_string(i) + ".h5";
+      shards.push_back(path("set/" + name));
+      testing::write_sample_shard(shards.back(), "shard" + std::to_string(i), counts[i],
+                                  20 * static_cast<unsigned>(i + 1));
+      list.push_back({{"file", name}, {"sha256", manifests::sha256_file(shards.back())}});
+    }
+    manifests::write_file_atomically(
+        path("set/dataset.json"),
+        manifests::seal_json({{"format", "quadruped3d-dataset"}, {"schema", 2}, {"shards", list}}));
+    train_on(path("set").string());
+    return shards;
+  }
+
+  void train_on(const std::string& source) {
+    config_.phases = {
+        {"only", Objective::prima, {}, {{"set", {source}, 1.0}}, 2, 1, false, 1e-3, 0, Decay::none}};
+  }
+
+  TrainingSummary run_without_damage(const std::string& out) const {
+    return train(config_, {.out = path(out), .threads = 1, .quiet = true, .skip_damaged = true});
   }
 
   testing::ScratchDir scratch_;
@@ -215,7 +261,7 @@ TEST_F(TrainingRun, WithoutBioFeaturesTheBioEncoderStartsAnewAndLearns) {
 
 TEST_F(TrainingRun, ALossThatIsNotFiniteNamesTheSamples) {
   manifests::ShardSample bad = testing::shard_sample("poison/0", 5, true);
-  bad.body.betas[3] = std::numeric_limits<float>::infinity();
+  bad.body.betas[3] = 1e30F;  // its square is beyond float32
   manifests::ShardHeader header;
   header.image_encoding = manifests::ImageEncoding::png;
   manifests::write_shard(path("poison.h5"), header, {bad});
@@ -227,6 +273,86 @@ TEST_F(TrainingRun, ALossThatIsNotFiniteNamesTheSamples) {
     EXPECT_THAT(error.what(), HasSubstr("step 1 of phase \"warm-up\": the loss is inf"));
     EXPECT_THAT(error.what(), HasSubstr("poison/0"));
   }
+}
+
+TEST_F(TrainingRun, ADamagedShardIsRefusedOrLeftOutAndNamed) {
+  const auto shards = train_on_dataset({4, 5});
+  EXPECT_TRUE(run("sound").finished);
+  const std::uintmax_t bytes = std::filesystem::file_size(shards[1]);
+  for (std::size_t at = 100; at < bytes; at += bytes / 9) {
+    flip_bit(shards[1], at);
+    const std::string text = message([&] { run("damaged"); });
+    EXPECT_THAT(text, HasSubstr("1 of the pools' shards and samples are damaged")) << "byte " << at;
+    EXPECT_THAT(text, HasSubstr(shards[1].string() + ": its SHA-256 is"));
+    EXPECT_FALSE(std::filesystem::exists(path("damaged/state.safetensors")));
+    flip_bit(shards[1], at);
+  }
+  flip_bit(shards[1], bytes / 2);
+  const TrainingSummary skipped = run_without_damage("skipped");
+  EXPECT_TRUE(skipped.finished);
+  EXPECT_THAT(skipped.left_out, ::testing::ElementsAre(HasSubstr("pool set: " + shards[1].string())));
+  train_on(shards[0].string());  // the same samples, and no others
+  EXPECT_EQ(manifests::read_file(skipped.model), manifests::read_file(run("first").model));
+}
+
+TEST_F(TrainingRun, AShardThatIsGoneOrNotListedIsDamage) {
+  const auto shards = train_on_dataset({4, 5});
+  std::filesystem::rename(shards[1], path("set/shards/other.h5"));
+  const std::string text = message([&] { run("out"); });
+  EXPECT_THAT(text, HasSubstr(shards[1].string() + ": it is gone"));
+  EXPECT_THAT(text, HasSubstr("other.h5: dataset.json does not list it"));
+}
+
+TEST_F(TrainingRun, ADamagedDatasetJsonIsRefused) {
+  train_on_dataset({4});
+  flip_bit(path("set/dataset.json"), 60);
+  EXPECT_THAT(message([&] { run("out"); }), HasSubstr(path("set/dataset.json").string()));
+}
+
+TEST_F(TrainingRun, AbsurdBoxesAreRefusedOrLeftOutAndNamed) {
+  std::vector<manifests::ShardSample> samples;
+  for (unsigned i = 0; i < 8; ++i)
+    samples.push_back(testing::shard_sample("s/" + std::to_string(i), i, true));
+  samples[1].patch_box[2] = 0.0;
+  samples[2].patch_box[2] = 1e18;
+  samples[4].patch_box[0] = std::nan("");
+  samples[5].body.pose[17] = std::nanf("");
+  samples[6].crop.resize(40);
+  manifests::ShardHeader header;
+  header.image_encoding = manifests::ImageEncoding::png;
+  manifests::write_shard(path("odd.h5"), header, samples);
+  train_on(path("odd.h5").string());
+  const std::string text = message([&] { run("out"); });
+  for (const char* id : {"s/1: its box", "s/2: its box", "s/4: its box", "s/5: its pose"}) {
+    EXPECT_THAT(text, HasSubstr(id));
+  }
+  const TrainingSummary skipped = run_without_damage("skipped");
+  EXPECT_TRUE(skipped.finished);
+  ASSERT_EQ(skipped.left_out.size(), 5U);
+  EXPECT_THAT(skipped.left_out[4], HasSubstr("s/6: its stored crop cannot be decoded"));
+  manifests::write_shard(path("sound.h5"), header, {samples[0], samples[3], samples[7]});
+  train_on(path("sound.h5").string());
+  EXPECT_EQ(manifests::read_file(skipped.model), manifests::read_file(run("sound").model));
+}
+
+TEST_F(TrainingRun, ADamagedStateIsRefused) {
+  run("out", 2);
+  const std::string sound = manifests::read_file(path("out/state.safetensors"));
+  const std::string straight = manifests::read_file(run("straight").model);
+  int refused = 0;
+  for (std::size_t at = 20; at < sound.size(); at += sound.size() / 40) {
+    std::filesystem::remove_all(path("copy"));
+    manifests::write_file_atomically(
+        (std::filesystem::create_directory(path("copy")), path("copy/state.safetensors")), sound);
+    flip_bit(path("copy/state.safetensors"), at);
+    try {
+      EXPECT_EQ(manifests::read_file(run("copy").model), straight) << "byte " << at;
+    } catch (const std::exception& error) {
+      EXPECT_THAT(error.what(), HasSubstr("copy")) << "byte " << at;
+      ++refused;
+    }
+  }
+  EXPECT_GE(refused, 36);
 }
 
 }  // namespace

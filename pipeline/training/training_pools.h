@@ -1,0 +1,44 @@
+// The samples of a training run, compared with what is known of them before any is used.
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "pipeline/feed/shard_pool.h"
+#include "pipeline/training/settings/training_config.h"
+
+namespace q3d::pipeline::training {
+
+class TrainingPools {
+ public:
+  // Reads all shards of the phases' pools whole (feed::check_shards) and looks at every record
+  // (feed::find_damaged_records). Damage throws std::runtime_error that counts and names it, or, with
+  // `skip_damaged`, is left out: a damaged shard with all its records, because nothing says which of them are
+  // true, and single records. Then every stored crop is decoded, too. Throws ConfigError if a pool has no
+  // sample left, Interrupted, and like check_shards.
+  TrainingPools(const std::vector<settings::PhaseConfig>& phases, bool skip_damaged);
+
+  // A pool of a phase, without what is left out.
+  feed::ShardPool open(const std::string& name) const;
+  // What decides which samples there are: the shards' digests, by pool, and what of them is left out.
+  const nlohmann::json& identity() const { return identity_; }
+  const std::vector<std::string>& left_out() const { return left_out_; }  // one a line, with the reason
+
+ private:
+  struct Sound {
+    std::vector<std::filesystem::path> shards;
+    std::vector<std::int64_t> left_out;  // positions
+  };
+  void check(const settings::PoolConfig& pool, bool skip_damaged);
+
+  std::map<std::string, Sound> pools_;  // by name
+  nlohmann::json identity_ = nlohmann::json::object();
+  std::vector<std::string> left_out_;
+};
+
+}  // namespace q3d::pipeline::training
