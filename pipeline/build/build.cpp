@@ -58,7 +58,7 @@ BuildSummary build(const config::BuildConfig& config, const run::RunOptions& opt
   stages::write_build_plan(options.out, summary.plan);
   summary.folder = version_folder(options.out, config, keys);
   summary.notes = workspace.ingest().notes;
-  summary.was_up_to_date = is_published(summary.folder, keys);
+  summary.was_up_to_date = is_published(summary.folder, keys) && !options.rebuild;
   workspace.digests().save();
   const auto seconds = [&] {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -78,7 +78,7 @@ BuildSummary build(const config::BuildConfig& config, const run::RunOptions& opt
   summary.dataset = dataset::read_dataset_manifest(summary.folder);
   for (const dataset::Warning& warning : summary.dataset.warnings) run::log_warning(warning.message);
   require_labels(summary.dataset, summary.folder);
-  point_latest(options.out, summary.folder);
+  if (!options.rebuild) point_latest(options.out, summary.folder);
   summary.seconds = seconds();
   return summary;
 }

@@ -81,6 +81,8 @@ void UnitBuilder::decode(unit::UnitWork& work) {
   // Here, because several units are decoded at once: these read whole files. A run that ends before the crops
   // needs no more of them than one that finds the shard.
   work.shard_before = !makes(Stage::crops) || shards_.has(*work.unit);
+  // A repair makes the unit's stored crops again too, which nobody would read otherwise.
+  if (workspace_.rebuilds() && !crops_.has(*work.unit)) work.shard_before = false;
   if (!work.shard_before) {
     if (auto table = crops_.load(*work.unit)) work.crops = unit::crops_from_table(std::move(*table));
   }

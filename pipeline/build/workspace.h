@@ -44,6 +44,7 @@ class Workspace {
   // Empty, like the digests of assets(), when no dataset needs the network.
   const std::string& device_key() const { return device_key_; }
   bool quiet() const { return options_.quiet; }
+  bool rebuilds() const { return options_.rebuild; }
   bool above_ceiling() const { return options_.above_ceiling; }
   manifests::DigestCache& digests() { return digests_; }
 

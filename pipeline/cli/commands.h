@@ -22,7 +22,7 @@ inline constexpr std::array<CommandInfo, 27> kCommands{{
     {"build", "make a versioned dataset of labels from annotated photographs", true},
     {"calibrate", "find the thresholds that give the wanted shares of labels", true},
     {"predict", "give the bodies of animals in photographs, with or without keypoints", true},
-    {"verify", "read a whole dataset and check every byte of it", false},
+    {"verify", "read a whole dataset and check every byte of it", false, "--repair"},
     {"status", "list the builds of an output folder, and how far each of their stages has come", false},
     {"inspect", "show what a dataset or a shard contains, as text or as a picture", false, "--sheet"},
     {"overlay", "draw predictions and labels as meshes over their photographs, or write them as 3D files",
@@ -62,6 +62,7 @@ Command add_calibrate(CLI::App& app);
 Command add_predict(CLI::App& app);
 Command add_verify(CLI::App& app);
 Command add_status(CLI::App& app);
+Command add_verify_with_repair(CLI::App& app);  // of quadruped3d-network, which can build
 Command add_inspect(CLI::App& app);
 Command add_inspect_with_sheets(CLI::App& app);  // of quadruped3d-network, which can pose bodies
 Command add_overlay(CLI::App& app);

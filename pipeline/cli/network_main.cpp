@@ -10,11 +10,12 @@
 int main(int argc, char** argv) {
   namespace cli = q3d::pipeline::cli;
   if (!cli::waiting_is_decided()) return cli::start_again_passively(argv);
-  // `inspect` comes before the plain command of that name, which draws no sheets.
+  // `verify` and `inspect` come before the plain commands of these names, which do not repair and draw no sheets.
   std::vector<cli::CommandEntry> entries{
       {"build", cli::add_build},
       {"calibrate", cli::add_calibrate},
       {"predict", cli::add_predict},
+      {"verify", cli::add_verify_with_repair},
       {"inspect", cli::add_inspect_with_sheets},
       {"overlay", cli::add_overlay},
       {"report", cli::add_report},

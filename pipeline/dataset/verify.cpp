@@ -16,10 +16,12 @@
 #include "loaders/pictures/encode.h"
 #include "manifests/digest.h"
 #include "manifests/enumerators.h"
+#include "manifests/file_descriptor.h"
 #include "manifests/shard.h"
 #include "pipeline/dataset/published_dataset.h"
 #include "pipeline/run/interrupt.h"
 #include "pipeline/run/progress.h"
+#include "pipeline/stages/stage_check.h"
 #include "pipeline/unit/annotated_body.h"
 #include "pipeline/unit/crop_keypoints.h"
 #include "smal/camera.h"
@@ -38,7 +40,7 @@ class Verifier {
  public:
   explicit Verifier(const fs::path& given) : dataset_(given) { summary_.folder = dataset_.folder(); }
 
-  VerifySummary run(bool quiet) {
+  VerifySummary run(bool quiet, bool with_stages) {
     const std::vector<ShardEntry>& shards = dataset_.manifest().shards;
     run::Progress progress("shards", static_cast<std::int64_t>(shards.size()), quiet);
     for (const ShardEntry& entry : shards) {
@@ -50,6 +52,7 @@ class Verifier {
     check_verdicts();
     check_labels();
     check_strays();
+    if (with_stages) check_stages();
     return summary_;
   }
 
@@ -59,13 +62,20 @@ class Verifier {
     summary_.problems.push_back(text);
   }
 
+  void damage(const fs::path& file, const std::string& expected, const std::string& text) {
+    problem(text);
+    const std::lock_guard lock(mutex_);
+    summary_.damage.push_back({file, expected});
+  }
+
   void check_shard(const ShardEntry& entry) {
     ++summary_.shards;
     const fs::path path = dataset_.shard_file(entry);
     try {
       const std::string digest = manifests::sha256_file(path);
       if (digest != entry.sha256) {
-        problem(fmt::format("{}: SHA-256 is {}, dataset.json says {}", entry.file, digest, entry.sha256));
+        damage(path, entry.sha256,
+               fmt::format("{}: SHA-256 is {}, dataset.json says {}", entry.file, digest, entry.sha256));
         return;
       }
       const manifests::Shard shard = manifests::read_shard(path);
@@ -78,6 +88,8 @@ class Verifier {
                             entry.unit));
       }
       check_samples(entry, shard);
+    } catch (const manifests::IoError& error) {
+      damage(path, entry.sha256, error.what());
     } catch (const std::runtime_error& error) {
       problem(error.what());
     }
@@ -179,10 +191,11 @@ class Verifier {
     }
     try {
       if (manifests::sha256_file(dataset_.verdicts_file()) != manifest.verdicts_sha256) {
-        problem("verdicts.csv: its SHA-256 is not the one in dataset.json");
+        damage(dataset_.verdicts_file(), manifest.verdicts_sha256,
+               "verdicts.csv: its SHA-256 is not the one in dataset.json");
       }
-    } catch (const std::runtime_error& error) {
-      problem(error.what());
+    } catch (const manifests::IoError& error) {
+      damage(dataset_.verdicts_file(), manifest.verdicts_sha256, error.what());
     }
     const Counts& counts = manifest.counts;
     if (counts.retained + counts.refined + counts.discarded + counts.failed != counts.candidates) {
@@ -241,14 +254,24 @@ class Verifier {
 
   // A file that dataset.json does not list is not part of the dataset.
   void check_strays() {
-    std::set<std::string> listed;
-    for (const ShardEntry& entry : dataset_.manifest().shards) {
-      listed.insert(fs::path(entry.file).filename().string());
+    std::set<std::string> listed{"dataset.json", "verdicts.csv", "shards"};
+    for (const ShardEntry& entry : dataset_.manifest().shards) listed.insert(entry.file);
+    for (const char* folder : {"", "shards"}) {
+      std::error_code error;
+      for (const auto& file : fs::directory_iterator(dataset_.folder() / folder, error)) {
+        const std::string name = (fs::path(folder) / file.path().filename()).string();
+        if (!listed.contains(name)) problem(name + ": not listed in dataset.json");
+      }
     }
-    std::error_code error;
-    for (const auto& file : fs::directory_iterator(dataset_.folder() / "shards", error)) {
-      const std::string name = file.path().filename().string();
-      if (listed.count(name) == 0) problem("shards/" + name + ": not listed in dataset.json");
+  }
+
+  void check_stages() {
+    const stages::StageCheck check = stages::check_stages(dataset_.output_folder());
+    summary_.stage_files = check.files;
+    for (const stages::StageProblem& found : check.problems) {
+      damage(found.file, found.expected,
+             fmt::format("{}: {}", found.file.lexically_relative(dataset_.output_folder()).string(),
+                         found.text));
     }
   }
 
@@ -262,8 +285,8 @@ class Verifier {
 
 }  // namespace
 
-VerifySummary verify(const fs::path& given, bool quiet) {
-  return Verifier(given).run(quiet);
+VerifySummary verify(const fs::path& given, bool quiet, bool with_stages) {
+  return Verifier(given).run(quiet, with_stages);
 }
 
 }  // namespace q3d::pipeline::dataset

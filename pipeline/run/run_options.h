@@ -10,6 +10,9 @@ struct RunOptions {
   int threads = 0;             // of the flow graph; 0 = all cores. Never changes a byte of the result.
   bool quiet = false;          // no progress on stderr
   bool above_ceiling = false;  // go on with a tau_high above filter.tau_ceiling
+  // Take every unit through the stages, also those of a dataset that is up to date, and leave `latest` as it
+  // is.
+  bool rebuild = false;
 };
 
 }  // namespace q3d::pipeline::run

@@ -97,16 +97,6 @@ std::string folder_name(const std::string& stage, const std::string& key) {
   return stage + "-" + key.substr(0, kShortKey);
 }
 
-// The key that a stage's manifest.json holds; nothing when the text is damaged so that it holds none.
-std::optional<std::string> key_in(const std::string& text) {
-  const json manifest = json::parse(text, nullptr, false);
-  const auto found = manifest.is_object() ? manifest.find("key") : manifest.end();
-  if (found == manifest.end() || !found->is_string()) return std::nullopt;
-  std::string key = found->get<std::string>();
-  const bool is_key = key.size() == 64 && key.find_first_not_of("0123456789abcdef") == std::string::npos;
-  return is_key ? std::optional(std::move(key)) : std::nullopt;
-}
-
 std::string predict_text(const config::BuildConfig& config, const AssetDigests& assets,
                          const std::string& device_key) {
   if (!config::needs_network(config)) {
@@ -216,6 +206,15 @@ std::map<std::string, std::string> made_from(const config::BuildConfig& config,
   return recipes_of_build(config, rules, ingest, assets, device_key).texts;
 }
 
+std::optional<std::string> key_in_manifest(const std::string& text) {
+  const json manifest = json::parse(text, nullptr, false);
+  const auto found = manifest.is_object() ? manifest.find("key") : manifest.end();
+  if (found == manifest.end() || !found->is_string()) return std::nullopt;
+  std::string key = found->get<std::string>();
+  const bool is_key = key.size() == 64 && key.find_first_not_of("0123456789abcdef") == std::string::npos;
+  return is_key ? std::optional(std::move(key)) : std::nullopt;
+}
+
 std::filesystem::path stage_folder(const std::filesystem::path& out, const std::string& stage,
                                    const std::string& key) {
   return out / "stages" / folder_name(stage, key);
@@ -227,7 +226,7 @@ void open_stage_folder(const std::filesystem::path& folder, const std::string& s
   manifests::remove_temporaries(folder);
   const std::filesystem::path manifest = folder / "manifest.json";
   if (std::filesystem::exists(manifest)) {
-    const std::optional<std::string> found = key_in(manifests::read_file(manifest));
+    const std::optional<std::string> found = key_in_manifest(manifests::read_file(manifest));
     if (found == key) return;
     if (found || folder.filename() != folder_name(stage, key)) {
       throw std::runtime_error(

@@ -10,6 +10,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "manifests/digest.h"
@@ -56,6 +57,8 @@ StageKeys stage_keys(const config::BuildConfig& config, const config::JudgingRul
 // <out>/stages/<stage>-<first 12 of key>.
 std::filesystem::path stage_folder(const std::filesystem::path& out, const std::string& stage,
                                    const std::string& key);
+// The key that the text of a stage's manifest.json holds; nothing when it is damaged so that it holds none.
+std::optional<std::string> key_in_manifest(const std::string& text);
 // Makes the folder, removes torn temporaries and writes manifest.json (stage and key). A manifest.json
 // without a readable key is damaged: it is written anew if the folder has the name that stage_folder gives,
 // and a warning says so. Throws std::runtime_error when the folder belongs to another key.
