@@ -2,13 +2,16 @@
 
 #include <ATen/Context.h>
 #include <ATen/Parallel.h>
+#include <ATen/Version.h>
 #include <dlfcn.h>
 #include <fmt/format.h>
 #include <malloc.h>
 #include <torch/cuda.h>
+#include <torch/version.h>
 
 #include <array>
 #include <charconv>
+#include <cstdlib>
 #include <filesystem>
 #include <limits>
 #include <optional>
@@ -102,6 +105,46 @@ DeviceChoice choose_device(const std::string& name, int local_rank) {
                     torch::cuda::device_count(), *reason));
   }
   return cuda_choice(*index);
+}
+
+namespace {
+
+// The libraries pick their matrix kernels by these, and round otherwise with each.
+std::string cpu_instructions() {
+#if defined(__x86_64__)
+  __builtin_cpu_init();
+  const char* vendor = __builtin_cpu_is("intel") ? "intel" : __builtin_cpu_is("amd") ? "amd" : "x86";
+  const char* set = "sse";
+  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) set = "avx2";
+  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw")) set = "avx512";
+  if (__builtin_cpu_supports("avx512vnni")) set = "avx512_vnni";
+  if (__builtin_cpu_supports("avx512bf16")) set = "avx512_bf16";
+  return fmt::format("{} {}", vendor, set);
+#else
+  return "no x86";
+#endif
+}
+
+// Variables by which a user keeps the libraries from using all that the processor has.
+std::string limits_of_the_environment() {
+  std::string text;
+  for (const char* name : {"ONEDNN_MAX_CPU_ISA", "DNNL_MAX_CPU_ISA", "MKL_ENABLE_INSTRUCTIONS", "MKL_CBWR"}) {
+    if (const char* value = std::getenv(name)) text += fmt::format(", {}={}", name, value);
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string arithmetic_of(const DeviceChoice& choice) {
+  std::string machine;
+  if (choice.device.is_cpu()) {
+    machine = fmt::format("{}, kernels {}{}", cpu_instructions(), at::get_cpu_capability(),
+                          limits_of_the_environment());
+  } else {
+    machine = cuda_device_name(choice.device.has_index() ? choice.device.index() : 0);
+  }
+  return fmt::format("{}, LibTorch {}", machine, TORCH_VERSION);
 }
 
 namespace {

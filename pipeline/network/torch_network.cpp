@@ -197,8 +197,10 @@ int compute_threads(const config::NetworkConfig& network) {
 }
 
 std::string device_key(const config::NetworkConfig& network) {
-  const bool on_cpu = choose_device(network.device, compute_threads(network)).device.is_cpu();
-  return on_cpu ? fmt::format("cpu-{}", compute_threads(network)) : "cuda";
+  const model::DeviceChoice choice = choose_device(network.device, compute_threads(network));
+  const std::string kind =
+      choice.device.is_cpu() ? fmt::format("cpu-{}", compute_threads(network)) : std::string("cuda");
+  return kind + ", " + model::arithmetic_of(choice);
 }
 
 device::NetworkDomain read_domain(const std::filesystem::path& checkpoint) {
