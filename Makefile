@@ -10,8 +10,10 @@ ALLOW_UPGRADES ?=
 ACCEPT_LICENCES ?=
 FUZZ_SECONDS ?= 60
 FUZZ_TARGETS ?=
+KILLS ?= 1000
+FLIPS ?= 300
 
-.PHONY: quadruped3d sample-model sample-loop test program build setup assets format tidy nightly bench asan fuzz clean help
+.PHONY: quadruped3d sample-model sample-loop test program build setup assets format tidy nightly bench asan fuzz torture clean help
 
 quadruped3d: program  ## build the dataset that CONFIG describes (default: the rendered sample world)
 	tools/quadruped3d.sh $(OUT) $(CONFIG)
@@ -55,11 +57,16 @@ fuzz: setup  ## fuzz every reader of files for FUZZ_SECONDS each (clang; tests/f
 	cmake --build build/fuzz --parallel $(JOBS) --target fuzz_targets
 	tools/fuzz.sh build/fuzz $(FUZZ_SECONDS) $(FUZZ_TARGETS)
 
-nightly:  ## all that CI has no time for: clang-tidy on every source, tests under the sanitizers, fuzzing
+torture: build  ## KILLS kills of all commands and FLIPS damaged files; compares what is left (tests/torture)
+	.venv/bin/python tests/torture/torture.py $(KILLS)
+	.venv/bin/python tests/torture/rot.py $(FLIPS)
+
+nightly:  ## all that CI has no time for: clang-tidy on every source, tests under the sanitizers, fuzzing, torture
 	$(MAKE) build
 	BUILD=$(BUILD) JOBS=$(JOBS) tools/tidy.sh --all
 	$(MAKE) asan
 	$(MAKE) fuzz FUZZ_SECONDS=600
+	$(MAKE) torture
 
 format:  ## format every source in place
 	git ls-files '*.h' '*.cpp' | xargs clang-format -i
