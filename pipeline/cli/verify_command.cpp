@@ -10,6 +10,7 @@
 
 #include "pipeline/dataset/verify.h"
 #include "pipeline/run/errors.h"
+#include "pipeline/run/printable.h"
 #include "pipeline/run/words.h"
 
 namespace q3d::pipeline::cli {
@@ -24,7 +25,8 @@ int check(const Arguments& arguments) {
   if (!arguments.config.files.empty()) throw run::ConfigError("--config belongs to --repair");
   const dataset::VerifySummary summary =
       dataset::verify(arguments.dataset, arguments.run.quiet, arguments.stages);
-  for (const std::string& problem : summary.problems) fmt::print(stderr, "problem: {}\n", problem);
+  for (const std::string& problem : summary.problems)
+    fmt::print(stderr, "problem: {}\n", run::printable_line(problem));
   const bool sound = summary.problems.empty();
   const auto problems = static_cast<std::int64_t>(summary.problems.size());
   const std::string stages =

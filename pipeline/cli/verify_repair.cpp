@@ -7,6 +7,7 @@
 
 #include "pipeline/build/repair.h"
 #include "pipeline/cli/verify_command.h"
+#include "pipeline/run/printable.h"
 #include "pipeline/run/words.h"
 
 namespace q3d::pipeline::cli {
@@ -19,11 +20,13 @@ nlohmann::ordered_json strings(const std::vector<std::filesystem::path>& paths) 
 }
 
 void tell(const build::RepairSummary& summary, bool has_config) {
-  for (const std::string& problem : summary.problems) fmt::print(stderr, "problem: {}\n", problem);
+  for (const std::string& problem : summary.problems)
+    fmt::print(stderr, "problem: {}\n", run::printable_line(problem));
   for (const auto& file : summary.quarantined) fmt::print(stderr, "moved to {}\n", file.string());
   for (const auto& file : summary.copied) fmt::print(stderr, "mended from a copy: {}\n", file.string());
   if (summary.was_built) fmt::print(stderr, "made the rest again from the sources and the stages\n");
-  for (const std::string& problem : summary.unrepaired) fmt::print(stderr, "not repaired: {}\n", problem);
+  for (const std::string& problem : summary.unrepaired)
+    fmt::print(stderr, "not repaired: {}\n", run::printable_line(problem));
   if (!summary.unrepaired.empty() && !has_config) {
     fmt::print(stderr, "give the --config files of the build to make what has no copy again\n");
   }

@@ -205,12 +205,12 @@ TEST_F(Rebuild, AnnotationsThatCannotBeReadStopTheRun) {
 
 TEST_F(Rebuild, CellsThatASpreadsheetWouldRunAreToldAndStayAsTheyAre) {
   config::BuildConfig changed = config();
-  changed.datasets.front().split = "=cmd|' /C calc'!A0";
+  changed.datasets.front().split = "=cmd|'C calc'!A0";
   run::RunOptions options;
   options.out = scratch_.path() / "out";
   options.quiet = true;
   const BuildSummary summary = build(changed, options);
-  EXPECT_THAT(manifests::read_file(summary.folder / "verdicts.csv"), HasSubstr(",=cmd|' /C calc'!A0,"));
+  EXPECT_THAT(manifests::read_file(summary.folder / "verdicts.csv"), HasSubstr(",=cmd|'C calc'!A0,"));
   EXPECT_THAT(told_, Contains(HasSubstr("6 cells of verdicts.csv begin with =, +, - or @")));
 }
 
