@@ -13,6 +13,7 @@ trials; the exit code is 1 if a trial ended otherwise than it should, and its fo
 import argparse
 import collections
 import dataclasses
+import functools
 import os
 import pathlib
 import random
@@ -60,40 +61,72 @@ def result_of(out):
     return files
 
 
-def jobs_on(shared):
-    """Makes the inputs of all jobs below `shared` and returns the jobs."""
-    data = shared / "labels"
-    write_annotations(data, give_bodies(draw_pictures(data, 12)))
-    configs = {}
-    for role in ("truth", "2d_only"):
-        configs[role] = write_json(shared / f"{role}.json", {
-            "name": role.replace("2d_only", "flat"), "shards": {"unit_size": 3},
-            "datasets": [prima_dataset(data, role, role=role)]})
-        run("build", "--config", configs[role], "--out", shared / role)
-    scene = Scene.make(shared / "scene")
-    make_network(shared / "initial.safetensors", body=shared / "smal.safetensors", priors=shared / "priors.safetensors")
-    network = {"initial": "initial.safetensors", "smal_asset": "smal.safetensors", "priors": "priors.safetensors"}
-    training = write_json(shared / "training.json", {
-        "network": {**{key: str(shared / file) for key, file in network.items()}, "device": "cpu", "compute_threads": 1},
-        "pools": {"truth": {"shards": [str(shared / "truth/latest")]}},
-        "stages": {"1": [{"name": "only", "pools": ["truth"], "steps": 4, "learning_rate": 1e-3}]},
-        "batch": 2, "log_every": 1, "checkpoint_every": 1})
-    leakage = write_json(shared / "leakage.json", {
-        "datasets": [prima_dataset(data, "pool")],
-        "leakage": {"test_sets": [prima_dataset(data, "test", split="test")]}})
-    versions = [shared / role / "latest" for role in ("truth", "2d_only")]
-    return [
-        Job("labels", lambda out: ["build", "--config", configs["truth"], "--out", out, "--quiet"]),
-        Job("network", lambda out: ["build", "--config", scene.config, "--config", scene.thresholds, "--out", out,
-                                    "--quiet"]),
-        Job("calibrate", lambda out: ["calibrate", "--config", scene.config, "--out", out, "--write",
-                                      out / "thresholds.json", "--quiet"]),
-        Job("train", lambda out: ["train", "--config", training, "--stage", "1", "--out", out, "--quiet"]),
-        Job("leakage", lambda out: ["leakage", "--config", leakage, "--out", out, "--quiet"]),
-        Job("merge", lambda out: ["merge", *versions, "--out", out, "--name", "both"]),
-        Job("export", lambda out: ["export", versions[0], "--format", "coco", "--out", out, "--pictures-anyway"]),
-        Job("sample", lambda out: ["sample", "--out", out, "--share", 0.004, "--pixels", 64, "--quiet"]),
-    ]
+class Inputs:
+    """The jobs, and their inputs below `shared`; what no job asks for is not made."""
+
+    def __init__(self, shared):
+        self.shared = shared
+
+    @functools.cached_property
+    def data(self):
+        write_annotations(self.shared / "data", give_bodies(draw_pictures(self.shared / "data", 12)))
+        return self.shared / "data"
+
+    @functools.cached_property
+    def scene(self):
+        return Scene.make(self.shared / "scene")
+
+    @functools.cache
+    def config(self, role):
+        return write_json(self.shared / f"{role}.json", {
+            "name": {"truth": "truth", "2d_only": "flat"}[role], "shards": {"unit_size": 3},
+            "datasets": [prima_dataset(self.data, role, role=role)]})
+
+    @functools.cache
+    def version(self, role):
+        run("build", "--config", self.config(role), "--out", self.shared / role)
+        return self.shared / role / "latest"
+
+    def labels(self):
+        return lambda out: ["build", "--config", self.config("truth"), "--out", out, "--quiet"]
+
+    def network(self):
+        return lambda out: ["build", "--config", self.scene.config, "--config", self.scene.thresholds, "--out", out,
+                            "--quiet"]
+
+    def calibrate(self):
+        return lambda out: ["calibrate", "--config", self.scene.config, "--out", out, "--write", out / "thresholds.json",
+                            "--quiet"]
+
+    def train(self):
+        files = {"initial": "initial.safetensors", "smal_asset": "smal.safetensors", "priors": "priors.safetensors"}
+        paths = {key: str(self.shared / file) for key, file in files.items()}
+        make_network(paths["initial"], body=paths["smal_asset"], priors=paths["priors"])
+        config = write_json(self.shared / "training.json", {
+            "network": {**paths, "device": "cpu", "compute_threads": 1},
+            "pools": {"truth": {"shards": [str(self.version("truth"))]}},
+            "stages": {"1": [{"name": "only", "pools": ["truth"], "steps": 4, "learning_rate": 1e-3}]},
+            "batch": 2, "log_every": 1, "checkpoint_every": 1})
+        return lambda out: ["train", "--config", config, "--stage", "1", "--out", out, "--quiet"]
+
+    def leakage(self):
+        config = write_json(self.shared / "leakage.json", {
+            "datasets": [prima_dataset(self.data, "pool")],
+            "leakage": {"test_sets": [prima_dataset(self.data, "test", split="test")]}})
+        return lambda out: ["leakage", "--config", config, "--out", out, "--quiet"]
+
+    def merge(self):
+        versions = [self.version(role) for role in ("truth", "2d_only")]
+        return lambda out: ["merge", *versions, "--out", out, "--name", "both"]
+
+    def export(self):
+        return lambda out: ["export", self.version("truth"), "--format", "coco", "--out", out, "--pictures-anyway"]
+
+    def sample(self):
+        return lambda out: ["sample", "--out", out, "--share", 0.004, "--pixels", 64, "--quiet"]
+
+
+JOBS = ("labels", "network", "calibrate", "train", "leakage", "merge", "export", "sample")
 
 
 def measure(job, out):
@@ -189,7 +222,7 @@ def parsed():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("kills", type=int)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--jobs", help="names of jobs, separated by commas (default: all)")
+    parser.add_argument("--jobs", default=",".join(JOBS), help="names, separated by commas (default: %(default)s)")
     parser.add_argument("--program", type=pathlib.Path, default=ROOT / "build/release/bin/quadruped3d")
     parser.add_argument("--faults", type=pathlib.Path, default=ROOT / "build/release/tests/faults/libq3d_faults.so")
     return parser.parse_args()
@@ -204,9 +237,8 @@ def main():
         os.environ[variable] = str(path.resolve())
     folder = pathlib.Path(tempfile.mkdtemp(prefix="q3d_torture_")).resolve()
     (folder / "shared").mkdir()
-    jobs = jobs_on(folder / "shared")
-    if arguments.jobs:
-        jobs = [job for job in jobs if job.name in arguments.jobs.split(",")]
+    inputs = Inputs(folder / "shared")
+    jobs = [Job(name, getattr(inputs, name)()) for name in arguments.jobs.split(",")]
     for job in jobs:
         measure(job, folder / "undisturbed")
         print(f"{job.name}: {job.seconds:.1f} s, {job.changes} writes, syncs, renames and links", flush=True)
