@@ -13,7 +13,7 @@ FUZZ_TARGETS ?=
 KILLS ?= 1000
 FLIPS ?= 300
 
-.PHONY: quadruped3d sample-model sample-loop test program build setup assets format tidy nightly bench asan fuzz torture clean help
+.PHONY: quadruped3d sample-model sample-loop test program build setup test-wheels assets format tidy nightly bench asan fuzz torture clean help
 
 quadruped3d: program  ## build the dataset that CONFIG describes (default: the rendered sample world)
 	tools/quadruped3d.sh $(OUT) $(CONFIG)
@@ -24,7 +24,7 @@ sample-model: program  ## train the default network on the rendered world (pre-t
 sample-loop: program  ## Stage 1, Stage 2, Stage 3 and their tables (SCHEDULE=full or quick, SEED=0)
 	tools/sample_loop.sh loop $(SCHEDULE) $(SEED)
 
-test: build  ## build everything and run all tests
+test: test-wheels build  ## build everything and run all tests
 	ctest --test-dir $(BUILD) --output-on-failure --parallel $(JOBS)
 
 program: $(BUILD)/build.ninja  ## compile the program alone (release unless PRESET says otherwise)
@@ -37,6 +37,9 @@ build: $(BUILD)/build.ninja  ## compile everything, tests too
 
 setup:  ## install Debian packages and LibTorch where they are missing (docs/install.md)
 	@tools/setup.sh $(if $(ALLOW_UPGRADES),--allow-upgrades)
+
+test-wheels: setup  ## install the Python wheels that only the tests need (docs/install.md)
+	@tools/setup.sh --python-only --tests
 
 assets: setup  ## fetch, verify and import the official weights and body (ACCEPT_LICENCES=1 accepts their terms)
 	@.venv/bin/python tools/import_assets.py fetch $(if $(ACCEPT_LICENCES),--accept-licences)

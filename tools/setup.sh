@@ -3,11 +3,12 @@
 # LibTorch among them, in a virtual environment at .venv. It installs only what is missing, so a second run takes a
 # fraction of a second, and it repairs an installation that was interrupted. docs/install.md explains each dependency.
 #
-#   tools/setup.sh [--allow-upgrades | --no-upgrades] [--python-only]
+#   tools/setup.sh [--allow-upgrades | --no-upgrades] [--python-only] [--tests]
 #
 #   --allow-upgrades  allow apt to upgrade an installed package if a missing one cannot be installed otherwise
 #   --no-upgrades     stop in that case; without either option setup asks, and upgrades where it cannot ask
 #   --python-only     leave the Debian packages alone and make .venv only (for users without root)
+#   --tests           also install what only the tests need, the wheels of tools/requirements-tests.txt
 #   PYTHON=python3.12 in the environment names the interpreter of .venv (default: python3)
 #
 # What apt and pip print goes to build/setup.log.
@@ -22,6 +23,7 @@ lock_poll_s=${SETUP_LOCK_POLL_S:-5}
 as_root=()
 allow_upgrades=ask
 python_only=no
+for_tests=no
 worked=no
 
 say() { printf 'setup: %s\n' "$*" >&2; }
@@ -198,14 +200,14 @@ install_packages() {
 
 # --- Python wheels ---------------------------------------------------------------------------------------------------
 
-# Makes .venv, or repairs it: another Python, no pip.
+# Makes .venv, or repairs it: another Python, no pip. $1 is the list of wheels that it is for.
 make_venv() {
   local version pinned
   version=$("$python" -c 'import sys; print("%d.%d" % sys.version_info[:2])') ||
     fail "$python cannot be run." "PYTHON=/path/to/python3 tools/setup.sh names another interpreter."
-  pinned=$(sed -n 's/^# CPython/CPython/p' tools/requirements.txt)
+  pinned=$(sed -n 's/^# CPython/CPython/p' "$1")
   grep -qE " $version( |,|\$)" <<<"$pinned" ||
-    fail "$python is version $version, for which tools/requirements.txt pins no wheels ($pinned)." \
+    fail "$python is version $version, for which $1 pins no wheels ($pinned)." \
       "PYTHON=python3.11 tools/setup.sh names another interpreter."
   .venv/bin/python -m pip --version >/dev/null 2>&1 && return
   if [ -e .venv ] || [ -L .venv ]; then
@@ -217,6 +219,7 @@ make_venv() {
     fail_with_log "$python cannot make a virtual environment." "On Debian and Ubuntu it needs the package python3-venv."
 }
 
+# pip_advice LIST: what to do after pip could not install the wheels of this list.
 pip_advice() {
   local again="Then run make setup again; it continues with what is missing."
   case "$(last_output 40)" in
@@ -225,12 +228,12 @@ pip_advice() {
       echo "$again"
       ;;
     *"DO NOT MATCH THE HASHES"*)
-      echo "A file is not the one that tools/requirements.txt pins; a mirror or proxy may have replaced it."
+      echo "A file is not the one that $1 pins; a mirror or proxy may have replaced it."
       echo "Do not use it. \`pip config list\` shows which index pip asks."
       ;;
     *"No matching distribution"*)
       echo "The package index, or the folder that stands for it, has no such wheel for $(uname -m) and this Python."
-      echo "tools/requirements.txt names the wheels that are needed."
+      echo "$1 names the wheels that are needed."
       ;;
     *"Failed to establish"* | *"timed out"* | *"Name or service"* | *"resolution"*)
       echo "The package index cannot be reached. docs/install.md (\"Offline\") says how to install from a folder."
@@ -240,34 +243,37 @@ pip_advice() {
   esac
 }
 
+# install_wheels NAME LIST OPTIONS...: installs the wheels that the file LIST pins, with these options of pip. A file
+# .venv/installed-NAME-DIGEST says that it was done for a list with this digest.
 install_wheels() {
-  local stamp broken missing=() amount advice
-  stamp=.venv/installed-$(sha256sum tools/requirements.txt | cut -c1-12)
+  local name=$1 list=$2 stamp broken missing=() amount advice
+  stamp=.venv/installed-$name-$(sha256sum "$list" | cut -c1-12)
   [ -f "$stamp" ] && [ -x .venv/bin/python ] &&
     compgen -G '.venv/lib/python3*/site-packages/torch/lib/libtorch_cpu.so' >/dev/null && return
   open_log
-  make_venv
+  make_venv "$list"
   # pip takes a package for installed once its metadata is there, however few of its files were written.
-  broken=$(.venv/bin/python tools/check_wheels.py --forget tools/requirements.txt) ||
+  broken=$(.venv/bin/python tools/check_wheels.py --forget "$list") ||
     say "these packages in .venv are only half there and are installed anew: ${broken//$'\n'/, }"
-  mapfile -t missing < <(.venv/bin/python tools/check_wheels.py tools/requirements.txt)
+  mapfile -t missing < <(.venv/bin/python tools/check_wheels.py "$list")
   if [ ${#missing[@]} -gt 0 ]; then
-    amount="${#missing[@]} of $(grep -cE '^[a-z0-9-]+==' tools/requirements.txt)"
+    amount="${#missing[@]} of $(grep -cE '^[a-z0-9-]+==' "$list")"
     case " ${missing[*]} " in
       *" torch "*) amount+=" Python wheels, LibTorch among them, into .venv (3 GB to download, 5 GB on disk)" ;;
+      *" pyarrow "*) amount+=" Python wheels for the tests into .venv (190 MB to download, 650 MB on disk)" ;;
       *) amount+=" Python wheels into .venv: ${missing[*]}" ;;
     esac
     say "installing $amount"
     if ! run .venv/bin/python -m pip install --disable-pip-version-check --no-input --progress-bar off \
-      --only-binary :all: --require-hashes -r tools/requirements.txt; then
-      mapfile -t advice < <(pip_advice)
+      --only-binary :all: --require-hashes "${@:3}" -r "$list"; then
+      mapfile -t advice < <(pip_advice "$list")
       fail_with_log "pip could not install the Python wheels." "${advice[@]}"
     fi
-    missing=("$(.venv/bin/python tools/check_wheels.py tools/requirements.txt)") ||
+    missing=("$(.venv/bin/python tools/check_wheels.py "$list")") ||
       fail "pip reported success, but .venv lacks files of these packages: ${missing[*]//$'\n'/, }" \
         "Remove .venv and run make setup again."
   fi
-  rm -f .venv/installed-*
+  rm -f ".venv/installed-$name"-*
   touch "$stamp"
 }
 
@@ -276,8 +282,9 @@ for argument in "$@"; do
     --allow-upgrades) allow_upgrades=yes ;;
     --no-upgrades) allow_upgrades=no ;;
     --python-only) python_only=yes ;;
+    --tests) for_tests=yes ;;
     *)
-      echo "usage: tools/setup.sh [--allow-upgrades | --no-upgrades] [--python-only]" >&2
+      echo "usage: tools/setup.sh [--allow-upgrades | --no-upgrades] [--python-only] [--tests]" >&2
       exit 2
       ;;
   esac
@@ -289,5 +296,8 @@ if [ $python_only = no ]; then
     say "this is not a Debian system: install the counterparts of tools/debian-packages.txt yourself"
   fi
 fi
-install_wheels
+install_wheels build tools/requirements.txt
+# One package of this list is published as source alone. It is built by the setuptools of the first list: pip would
+# fetch one whose digest nobody checks.
+[ $for_tests = no ] || install_wheels tests tools/requirements-tests.txt --no-build-isolation --use-pep517
 [ $worked = no ] || say "everything is installed ($SECONDS s)"

@@ -7,7 +7,7 @@ import unittest
 import h5py
 import numpy as np
 
-from support import Shards, needs
+from support import Shards
 from quadruped3d import AugmentOptions, Dataset, Draw, ShardError, Shuffle
 
 
@@ -16,7 +16,6 @@ def images_of(dataset, keys):
     return [dataset[key]["image"].tobytes() for key in keys]
 
 
-@needs("cv2")
 class Numbers(Shards):
     def test_samples_of_all_sources_have_one_running_number(self):
         dataset = Dataset([self.shards / "png.h5", self.shards / "single.h5"])
@@ -60,7 +59,6 @@ class Numbers(Shards):
         self.assertEqual(list(sampler), epochs[1])
 
 
-@needs("cv2")
 class Processes(Shards):
     def test_a_pickled_dataset_reads_the_same(self):
         dataset = Dataset(self.shards / "jpeg.h5", augment=True)
@@ -78,7 +76,6 @@ class Processes(Shards):
                     self.assertEqual(job.get(timeout=300), expected)
 
 
-@needs("cv2")
 class Loader(Shards):
     def batches(self, epochs, **options):
         from torch.utils.data import DataLoader
@@ -108,7 +105,6 @@ class Loader(Shards):
                     self.assertTrue((one["image"] == other["image"]).all())
 
 
-@needs("cv2")
 class Refusals(Shards):
     def test_shards_without_pictures(self):
         path = self.folder / "reference.h5"

@@ -6,10 +6,9 @@ import subprocess
 import sys
 import unittest
 
-from support import PACKAGE, REPOSITORY, Folder, Shards, needs
+from support import PACKAGE, REPOSITORY, Folder, Shards
 
 
-@needs("cv2")
 class Example(Shards):
     def test_it_trains(self):
         script = PACKAGE / "examples" / "train.py"

@@ -9,11 +9,10 @@ import unittest
 
 import numpy as np
 
-from support import PACKAGE, Shards, check_issues, make_dataset, needs
+from support import PACKAGE, Shards, check_issues, make_dataset
 from quadruped3d import Shard, load
 
 os.environ["HF_HUB_OFFLINE"] = "1"
-EXTRAS = ("cv2", "pyarrow", "pandas", "datasets", "mlcroissant")
 OPEN = {"licence": "CC-BY-4.0", "source_url": "https://example.org/zoo", "citation": "A. Keeper (2020), \"Zoo | one\""}
 CLOSED = {"licence": "", "source_url": "", "citation": ""}
 
@@ -29,7 +28,6 @@ def dense(value):
     return value
 
 
-@needs(*EXTRAS)
 class Exports(Shards):
     def setUp(self):
         super().setUp()
@@ -86,7 +84,6 @@ class Exports(Shards):
         with contextlib.chdir(self.folder / "out"):
             croissant = mlcroissant.Dataset(jsonld="croissant.json")
             check_issues(self, croissant)
-            self.assertEqual(str(croissant.metadata.conforms_to.value), "http://mlcommons.org/croissant/1.1")
             records = list(croissant.records("train"))
         labels = self.labels()
         self.assertEqual([record["train/id"].decode() for record in records], list(labels["id"]))
@@ -111,7 +108,6 @@ class Exports(Shards):
         self.assertEqual(files_of(self.folder / "one"), files_of(self.folder / "two"))
 
 
-@needs(*EXTRAS)
 class Licences(Shards):
     def setUp(self):
         super().setUp()
@@ -139,7 +135,6 @@ class Licences(Shards):
         self.assertEqual(self.pictures(self.folder / "out"), [True] * 6)
 
 
-@needs(*EXTRAS)
 class Resuming(Shards):
     # Stops at a rename: the file is complete under its temporary name and not yet under its own.
     KILLED = """
@@ -209,7 +204,6 @@ class CommandLine(Shards):
         self.assertEqual(result.returncode, 2)
         self.assertIn("pip install 'quadruped3d[export]'", result.stderr)
 
-    @needs(*EXTRAS)
     def test_summary_and_notes(self):
         dataset = make_dataset(self.folder / "made", [self.shards / "png.h5"], {"made/train": CLOSED})
         result = self.run_main("hf", dataset, "--out", self.folder / "out", "--json")

@@ -6,12 +6,11 @@ import unittest
 
 import numpy as np
 
-from support import PACKAGE, Shards, needs
+from support import PACKAGE, Shards
 from quadruped3d import load
 
 
 class Table(Shards):
-    @needs("pandas")
     def test_a_table_has_a_row_for_each_sample(self):
         table = load(self.shards / "jpeg.h5", table=True)
         self.assertEqual(len(table), 6)
@@ -23,7 +22,6 @@ class Table(Shards):
 
 
 class Types(unittest.TestCase):
-    @needs("mypy")
     def test_mypy_has_no_complaint(self):
         result = subprocess.run([sys.executable, "-m", "mypy", "--strict"], cwd=PACKAGE, capture_output=True, text=True)
         self.assertEqual(result.returncode, 0, result.stdout + result.stderr)

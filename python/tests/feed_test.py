@@ -5,13 +5,12 @@ import unittest
 
 import numpy as np
 
-from support import Shards, feed_batch, needs
+from support import Shards, feed_batch
 from quadruped3d import AugmentOptions, Dataset, Draw, FeedOrder
 
 LABELS = ("keypoints_2d", "keypoints_3d", "rotations", "betas", "has_pose", "has_betas")
 
 
-@needs("cv2")
 class AgainstTheFeed(Shards):
     def compare(self, pools, weights, seed=1, first=0, count=12, augment=None, raw_v=False):
         """Compares the draws, and every sample drawn; returns both sides' samples."""

@@ -5,7 +5,7 @@ import unittest
 
 import numpy as np
 
-from support import REPOSITORY, needs, read_safetensors
+from support import REPOSITORY, read_safetensors
 from quadruped3d import body, geometry, pictures
 
 PARITY = REPOSITORY / "tests" / "data" / "parity"
@@ -32,7 +32,6 @@ class OfficialCrops(unittest.TestCase):
         for number, _, affine, _ in self.cases():
             np.testing.assert_array_equal(affine, self.golden[f"aug{number}__trans"])
 
-    @needs("cv2")
     def test_the_pixels_are_the_official_ones(self):
         compared = 0
         for number, record, affine, flags in self.cases():

@@ -11,7 +11,7 @@ import unittest
 import numpy as np
 from PIL import Image
 
-from support import PACKAGE, Shards, check_issues, make_dataset, needs
+from support import PACKAGE, Shards, check_issues, make_dataset
 from quadruped3d import KEYPOINTS, Shard, body, geometry, load
 
 TERMS = {"zoo/train": {"licence": "CC-BY-4.0", "source_url": "https://example.org/zoo", "citation": "A zoo"}}
@@ -90,13 +90,11 @@ class Prima(Program):
                 self.assertEqual((root / record["img_path"]).read_bytes(), shard.picture(row))
         self.assertEqual(kinds, {"none", "own"})
 
-    @needs("mlcroissant")
     def test_croissant_is_valid_and_gives_the_records(self):
         check_croissant(self, self.export("prima"), "zoo-train", "id", [name.encode() for name in self.labels["id"]])
 
 
 class Coco(Program):
-    @needs("pycocotools")
     def test_pycocotools_reads_it(self):
         from pycocotools.coco import COCO
 
@@ -119,7 +117,6 @@ class Coco(Program):
             np.testing.assert_allclose(points[visible, :2], expected[visible], atol=1e-9)
             self.assertEqual(image["quadruped3d"]["id"], self.labels["id"][row])
 
-    @needs("pycocotools")
     def test_corrections_come_back(self):
         from pycocotools.coco import COCO
 
@@ -141,7 +138,6 @@ class Coco(Program):
         veto = (self.folder / "changes" / "veto.txt").read_text()
         self.assertIn(f"{self.labels['id'][1]}\t", veto)
 
-    @needs("mlcroissant")
     def test_croissant_is_valid(self):
         check_croissant(self, self.export("coco"), "annotations", "id", list(range(1, 7)))
 
@@ -153,7 +149,6 @@ class ParquetByTheProgram(Program):
         self.assertIn("pip install './python[export]'", result.stderr)
         self.assertFalse((self.folder / "x").exists())
 
-    @needs("pyarrow")
     def test_the_program_calls_the_package(self):
         import pyarrow.parquet
 
@@ -170,7 +165,6 @@ def check_croissant(case, folder, record_set, field, expected):
     with contextlib.chdir(folder):
         dataset = mlcroissant.Dataset(jsonld="croissant.json")
         check_issues(case, dataset)
-        case.assertEqual(dataset.metadata.conforms_to.value, "http://mlcommons.org/croissant/1.1")
         records = list(dataset.records(record_set))
     case.assertEqual([record[f"{record_set}/{field}"] for record in records], expected)
 

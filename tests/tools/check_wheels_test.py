@@ -3,7 +3,6 @@
 import contextlib
 import importlib.metadata
 import io
-import os
 import pathlib
 import re
 import tempfile
@@ -14,7 +13,8 @@ import support  # first of ours: it sets the path
 import check_wheels
 from pip._vendor.packaging.requirements import Requirement  # pip's own reader of requirements
 
-REQUIREMENTS = os.path.join(support.ROOT, "tools", "requirements.txt")
+TOOLS = pathlib.Path(support.ROOT, "tools")
+LISTS = ("requirements", "requirements-tests")
 
 
 class CheckWheelsTest(unittest.TestCase):
@@ -86,23 +86,26 @@ class CheckWheelsTest(unittest.TestCase):
 
 
 class RequirementsTest(unittest.TestCase):
-    """tools/requirements.txt against requirements.in and against what the installed packages say that they need."""
+    """The lists of wheels against the .in files and against what the installed packages say that they need."""
 
     @classmethod
     def setUpClass(cls):
-        with open(REQUIREMENTS, encoding="utf-8") as file:
-            cls.text = file.read()
-        cls.pinned = check_wheels.pins(cls.text)
+        cls.texts = {name: (TOOLS / f"{name}.txt").read_text(encoding="utf-8") for name in LISTS}
+        cls.pinned = {name: check_wheels.pins(text) for name, text in cls.texts.items()}
+        cls.sources = {name: check_wheels.pins((TOOLS / f"{name}.in").read_text(encoding="utf-8")) for name in LISTS}
 
-    def test_it_pins_what_the_source_pins(self):
-        with open(REQUIREMENTS.replace(".txt", ".in"), encoding="utf-8") as file:
-            source = check_wheels.pins(file.read())
-        self.assertEqual({name: self.pinned[name] for name in source}, source)
-        self.assertEqual(source["torch"], "2.11.0")
+    def test_they_pin_what_the_sources_pin(self):
+        for name, source in self.sources.items():
+            self.assertEqual({package: self.pinned[name][package] for package in source}, source)
+        self.assertEqual(self.sources["requirements"]["torch"], "2.11.0")
 
-    def test_every_package_that_is_needed_is_pinned(self):
+    def test_no_package_is_in_both(self):
+        self.assertEqual(set.intersection(*map(set, self.pinned.values())), set())
+
+    def needed(self, names):
+        """The names of these packages and of all that they need here."""
         needed, seen = set(), set()
-        waiting = [(name, "") for name in ("torch", "numpy", "h5py", "pillow")]
+        waiting = [(name, "") for name in names]
         while waiting:
             name, extra = entry = waiting.pop()
             if entry in seen:
@@ -112,19 +115,47 @@ class RequirementsTest(unittest.TestCase):
             for requirement in map(Requirement, importlib.metadata.requires(name) or []):
                 if requirement.marker is None or requirement.marker.evaluate({"extra": extra}):
                     waiting += [(requirement.name, wanted) for wanted in ("", *requirement.extras)]
-        self.assertGreater(len(needed), 25)  # torch alone needs 27 on Linux
-        self.assertEqual(needed - set(self.pinned), set())
+        return needed
+
+    def test_every_package_that_is_needed_is_pinned(self):
+        for_build = self.needed(self.sources["requirements"])
+        self.assertGreater(len(for_build), 25)  # torch alone needs 27 on Linux
+        self.assertEqual(for_build - set(self.pinned["requirements"]), set())
+        for_tests = self.needed(self.sources["requirements-tests"])
+        self.assertGreater(len(for_tests), 40)
+        self.assertEqual(for_tests - for_build - set(self.pinned["requirements-tests"]), set())
 
     def test_every_python_and_machine_has_its_wheel_with_a_digest(self):
-        blocks = re.findall(r"((?:#   \S+\.whl\n)+)(\S+)==\S+((?: \\\n    --hash=sha256:[0-9a-f]{64})+)\n", self.text)
-        self.assertEqual([name for _, name, _ in blocks], list(self.pinned))
-        for wheels, name, digests in blocks:
-            wheels = wheels.split()[1::2]
-            self.assertEqual(len(wheels), len(set(digests.split()[1::2])), name)
-            for tag in ("cp311", "cp312"):
-                for machine in ("x86_64", "aarch64"):
-                    fits = [w for w in wheels if re.search(f"-({tag}|py3|py2.py3)-.*({machine}|any).whl$", w)]
-                    self.assertEqual(len(fits), 1, (name, tag, machine))
+        for name, text in self.texts.items():
+            without_wheel = re.findall(r"^--no-binary (\S+)$", text, re.MULTILINE)
+            archives = r"((?:#   \S+\.(?:whl|tar\.gz)\n)+)"
+            blocks = re.findall(archives + r"(\S+)==\S+((?: \\\n    --hash=sha256:[0-9a-f]{64})+)\n", text)
+            self.assertEqual([package for _, package, _ in blocks], list(self.pinned[name]))
+            for archives, package, digests in blocks:
+                archives = archives.split()[1::2]
+                self.assertEqual(len(archives), len(set(digests.split()[1::2])), package)
+                if package in without_wheel:
+                    self.assertEqual(archives, [f"{package}-{self.pinned[name][package]}.tar.gz"])
+                    continue
+                for minor in (11, 12):
+                    for machine in ("x86_64", "aarch64"):
+                        fits = [wheel for wheel in archives if suits(wheel, minor, machine)]
+                        self.assertEqual(len(fits), 1, (package, minor, machine))
+
+    def test_only_one_package_is_built_from_its_source(self):
+        found = re.findall(r"^--no-binary (\S+)$", "".join(self.texts.values()), re.MULTILINE)
+        self.assertEqual(found, ["jsonpath-rw"])
+
+
+def suits(wheel, minor, machine):
+    """True when a wheel, by its name, is for CPython 3.`minor` and this machine."""
+    python, abi, platform = wheel.removesuffix(".whl").split("-")[-3:]
+    if not (platform == "any" or platform.endswith(machine)):
+        return False
+    tags = python.split(".")
+    if abi == "abi3":  # built for this CPython and all later ones
+        return any(int(tag.removeprefix("cp3")) <= minor for tag in tags)
+    return bool({"py3", f"py3{minor}", f"cp3{minor}"} & set(tags))
 
 
 if __name__ == "__main__":

@@ -27,6 +27,7 @@ numpy==2.0 \\
 torch==2.0 \\
     --hash=sha256:01
 """
+TEST_REQUIREMENTS = REQUIREMENTS.replace("numpy", "pandas").replace("torch", "pyarrow")
 LIBTORCH = ".venv/lib/python3.11/site-packages/torch/lib/libtorch_cpu.so"
 UPGRADE = """Inst libcurl4 [7.1-1] (7.1-2 Debian-Security:12 [amd64])
 Inst libcurl4-openssl-dev (7.1-2 Debian-Security:12 [amd64])
@@ -90,6 +91,7 @@ class SetupCase(unittest.TestCase):
         shutil.copy(os.path.join(support.ROOT, "tools", "setup.sh"), self.home / "tools")
         self.write("tools/debian-packages.txt", "\n".join(PACKAGES) + "\n")
         self.write("tools/requirements.txt", REQUIREMENTS)
+        self.write("tools/requirements-tests.txt", TEST_REQUIREMENTS)
         self.python = [
             Rule("^python3 -c", out="3.11"),
             Rule("^python3 -m venv .venv$", writes={".venv/bin/python": self.stand_in}),
@@ -382,6 +384,31 @@ class VenvTest(SetupCase):
         self.assertEqual(self.run_setup([self.packages])[0], 0)
         self.assertEqual((self.called("-m venv"), len(self.called("pip install"))), ([], 1))
         self.assertEqual((len(self.stamps()), self.stamps() == before), (1, False))
+
+    def test_what_only_the_tests_need_follows_what_the_build_needs(self):
+        rule = Rule("^python tools/check_wheels.py tools/requirements-tests.txt$", out="pandas\npyarrow", code=1, times=1)
+        code, messages = self.run_setup([self.packages, rule], "--tests")
+        self.assertEqual(code, 0, messages)
+        self.assertIn("installing 2 of 2 Python wheels for the tests into .venv", messages)
+        build, tests = self.called("pip install")
+        self.assertIn("--require-hashes -r tools/requirements.txt", build)
+        self.assertIn("--require-hashes --no-build-isolation --use-pep517 -r tools/requirements-tests.txt", tests)
+        self.assertEqual(len(self.stamps()), 2)
+        self.assertEqual(self.run_setup([self.packages], "--tests"), (0, ""))  # all is there
+        self.assertEqual(self.calls, [])
+
+    def test_other_wheels_for_the_tests_leave_those_of_the_build_alone(self):
+        self.run_setup([self.packages], "--tests")
+        self.write("tools/requirements-tests.txt", TEST_REQUIREMENTS.replace("2.0", "2.1"))
+        rule = Rule("^python tools/check_wheels.py tools/requirements-tests.txt$", out="pandas", code=1, times=1)
+        self.assertEqual(self.run_setup([self.packages, rule], "--tests")[0], 0)
+        (install,) = self.called("pip install")
+        self.assertIn("-r tools/requirements-tests.txt", install)
+        self.assertEqual(len(self.stamps()), 2)
+
+    def test_without_the_option_nothing_is_installed_for_the_tests(self):
+        self.assertEqual(self.run_setup([self.packages])[0], 0)
+        self.assertEqual(self.called("requirements-tests"), [])
 
     def test_an_environment_without_pip_is_made_anew(self):
         self.write(".venv/bin/python", self.stand_in)
