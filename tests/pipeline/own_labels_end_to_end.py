@@ -4,12 +4,11 @@ import csv
 import io
 import json
 import pathlib
-import shlex
 
 import numpy as np
 from PIL import Image
 
-from e2e import Case, read_samples, run, verdicts, write_json
+from e2e import Case, pages, read_samples, run, verdicts, write_json
 
 PAGE = pathlib.Path(__file__).parents[2] / "docs" / "own-labels.md"
 # Animal3D's order.
@@ -19,49 +18,23 @@ right_front_knee left_back_knee right_back_knee neck tail_tip left_ear right_ear
 right_mouth_corner nose tail_mid""".split()
 
 
-def blocks_of_page():
-    """(language, text, name) of every fenced block; the name is what the paragraph above it begins with, as `NAME`."""
-    blocks, name, fence = [], None, None
-    for line in PAGE.read_text().splitlines():
-        if fence is not None:
-            if line == "```":
-                blocks.append((fence[0], "".join(text + "\n" for text in fence[1:]), name))
-                name, fence = None, None
-            else:
-                fence.append(line)
-        elif line.startswith("```"):
-            fence = [line[3:]]
-        elif line.startswith("`"):
-            name = line[1:line.index("`", 1)]
-    return blocks
-
-
-def files_of_page():
-    return {name: text for language, text, name in blocks_of_page() if language in ("json", "csv")}
-
-
-def commands_of_page():
-    return [shlex.split(line) for language, text, _ in blocks_of_page() if language == "sh"
-            for line in text.splitlines()]
-
-
 class OwnLabels(Case):
     @classmethod
     def prepare(cls):
         goats = cls.shared / "goats"
-        for name, content in files_of_page().items():
+        for name, content in pages.files(PAGE).items():
             (goats / name).parent.mkdir(parents=True, exist_ok=True)
             (goats / name).write_text(content)
         generator = np.random.default_rng(3)
         for name in ("labeled-data/walk/img0001.png", "labeled-data/walk/img0002.png", "frames/field.png"):
             (goats / name).parent.mkdir(parents=True, exist_ok=True)
             Image.fromarray(generator.integers(0, 255, (150, 200, 3), dtype=np.uint8)).save(goats / name)
-        results = [run(*words[1:], cwd=cls.shared) for words in commands_of_page()]
+        results = [run(*words[1:], cwd=cls.shared) for words in pages.commands(PAGE)]
         write_json(cls.shared / "exit_codes.json", [result.returncode for result in results])
 
     @classmethod
     def recall(cls):
-        cls.files = files_of_page()
+        cls.files = pages.files(PAGE)
         cls.dataset = cls.shared / "out" / "latest"
         cls.samples = {sample["id"].decode(): sample for sample in read_samples(cls.dataset)}
 

@@ -8,9 +8,11 @@ __main__.py, which also tells it where the program is. The parts:
     scene      Scene: drawn pictures, a tiny network, a config and calibrated thresholds
     pictures   draw pictures and annotations, give bodies to annotations, make networks and the rendered world
     intake     IntakeCase: label files as people have them, over pictures with a dot at each keypoint
+    pages      cut the files and commands out of a page of docs
     datasets   read what the program wrote: verdicts, labels, digests, journals; damage files
 """
 
+from . import pages
 from .case import Case
 from .datasets import (copy_folder, digests, file_sha256, flip_bit, journal_lines, kept, latest, read_byte_column,
                        read_csv, read_safetensors, read_samples, seal_json, split_safetensors, stamps,
