@@ -108,7 +108,7 @@ def flip_bit(path, offset=None, bit=0):
     path.write_bytes(content)
 
 
-_NUMPY_TYPES = {"F64": np.float64, "F32": np.float32, "I32": np.int32, "I64": np.int64}
+_NUMPY_TYPES = {"F64": np.float64, "F32": np.float32, "F16": np.float16, "I32": np.int32, "I64": np.int64}
 
 
 def split_safetensors(path):
