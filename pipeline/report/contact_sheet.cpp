@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 
@@ -93,7 +94,9 @@ void write_contact_sheet(const SheetOptions& options, const device::BodyMeshesLo
   const OverlayPainter painter(bodies.get());
   std::vector<cv::Mat> cells;
   for (const manifests::ShardSample& sample : samples) cells.push_back(cell(sample, painter));
-  const std::vector<std::byte> png = loaders::pictures::encode_png(overlay_sheet(cells, options.columns));
+  constexpr std::array kShown{Panel::label, Panel::keypoints};
+  const std::vector<std::byte> png =
+      loaders::pictures::encode_png(overlay_sheet(cells, kShown, options.columns));
   manifests::write_file_atomically(options.out, std::span(png));
 }
 

@@ -70,12 +70,13 @@ class OverlayPainter {
   MeshPainter painter_;
 };
 
-// Draws a legend of the colours, in one strip of this width.
-cv::Mat overlay_legend(int width_px);
+// Draws what the colours in these panels mean, in one strip of this width. The strip has no rows where they need
+// no explanation.
+cv::Mat overlay_legend(std::span<const Panel> panels, int width_px);
 
 // The pictures below each other or in `columns` columns, on paper, each as wide as the widest, and the legend
-// at the end. Throws std::invalid_argument where there are none.
-cv::Mat overlay_sheet(const std::vector<cv::Mat>& pictures, int columns);
+// of the panels in them at the end. Throws std::invalid_argument where there are none.
+cv::Mat overlay_sheet(const std::vector<cv::Mat>& pictures, std::span<const Panel> panels, int columns);
 
 // "discarded (gain_too_small): lion, felidae; L_proj 0.061 -> 0.055, gain 3.1 %": the verdict in one line.
 std::string verdict_line(const dataset::VerdictRow& row);

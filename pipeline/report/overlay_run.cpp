@@ -39,7 +39,8 @@ class OverlayWriter {
     const cv::Mat picture = options_.captions ? painter_.captioned(subject, options_.panels)
                                               : painter_.row(subject, options_.panels);
     if (!options_.folder.empty()) {
-      write_png(options_.folder / (stem + ".png"), options_.captions ? overlay_sheet({picture}, 1) : picture);
+      write_png(options_.folder / (stem + ".png"),
+                options_.captions ? overlay_sheet({picture}, options_.panels, 1) : picture);
       ++summary_.files;
     }
     if (!options_.sheet.empty()) pictures_.push_back(picture);
@@ -48,7 +49,7 @@ class OverlayWriter {
 
   OverlaySummary finish() {
     if (!options_.sheet.empty()) {
-      write_png(options_.sheet, overlay_sheet(pictures_, options_.columns));
+      write_png(options_.sheet, overlay_sheet(pictures_, options_.panels, options_.columns));
       ++summary_.files;
     }
     return std::move(summary_);

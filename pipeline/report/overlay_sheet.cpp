@@ -1,7 +1,9 @@
 #include <opencv2/imgproc.hpp>
 
 #include <algorithm>
+#include <span>
 #include <stdexcept>
+#include <vector>
 
 #include "pipeline/report/lettering.h"
 #include "pipeline/report/overlay_painter.h"
@@ -16,15 +18,29 @@ struct LegendEntry {
   const char* text;
 };
 
+std::vector<LegendEntry> entries_of(std::span<const Panel> panels) {
+  const auto has = [&](Panel panel) { return std::ranges::find(panels, panel) != panels.end(); };
+  std::vector<LegendEntry> entries;
+  if (has(Panel::prediction) || has(Panel::side)) {
+    entries.push_back({colours::kBlue, "mesh: the network's prediction"});
+  }
+  if (has(Panel::label) || has(Panel::side)) {
+    entries.push_back({colours::kOrange, "mesh: label, or adapted and dropped"});
+  }
+  if (has(Panel::keypoints)) {
+    entries.insert(entries.end(), {{colours::kBlue, "bones and keypoints: left of the animal"},
+                                   {colours::kOrange, "right of the animal"},
+                                   {colours::kWhite, "middle"},
+                                   {colours::kYellow, "cross: keypoint of the body; line: its error"}});
+  }
+  return entries;
+}
+
 }  // namespace
 
-cv::Mat overlay_legend(int width_px) {
-  const std::vector<LegendEntry> entries{{colours::kBlue, "mesh: the network's prediction"},
-                                         {colours::kOrange, "mesh: label, or adapted and dropped"},
-                                         {colours::kBlue, "bones and keypoints: left of the animal"},
-                                         {colours::kOrange, "right of the animal"},
-                                         {colours::kWhite, "middle"},
-                                         {colours::kYellow, "cross: keypoint of the body; line: its error"}};
+cv::Mat overlay_legend(std::span<const Panel> panels, int width_px) {
+  const std::vector<LegendEntry> entries = entries_of(panels);
+  if (entries.empty()) return cv::Mat(0, width_px, CV_8UC3);
   constexpr int kSwatch = 12;
   const int step = line_height_px(TextSize::small) + 4;
   std::vector<cv::Point> places;
@@ -45,7 +61,7 @@ cv::Mat overlay_legend(int width_px) {
   return strip;
 }
 
-cv::Mat overlay_sheet(const std::vector<cv::Mat>& pictures, int columns) {
+cv::Mat overlay_sheet(const std::vector<cv::Mat>& pictures, std::span<const Panel> panels, int columns) {
   if (pictures.empty()) throw std::invalid_argument("overlay_sheet: there is no picture");
   const int across = std::clamp(columns, 1, static_cast<int>(pictures.size()));
   int cell_width = 0;
@@ -56,8 +72,8 @@ cv::Mat overlay_sheet(const std::vector<cv::Mat>& pictures, int columns) {
     heights.back() = std::max(heights.back(), pictures[i].rows);
   }
   const int width = across * cell_width + (across + 1) * kMarginPx;
-  const cv::Mat legend = overlay_legend(width - 2 * kMarginPx);
-  int height = kMarginPx + legend.rows + kMarginPx;
+  const cv::Mat legend = overlay_legend(panels, width - 2 * kMarginPx);
+  int height = kMarginPx + (legend.empty() ? 0 : legend.rows + kMarginPx);
   for (const int line : heights) height += line + kMarginPx;
   cv::Mat sheet(height, width, CV_8UC3, colours::kPaper);
   int y = kMarginPx;
@@ -70,7 +86,7 @@ cv::Mat overlay_sheet(const std::vector<cv::Mat>& pictures, int columns) {
     pictures[i].copyTo(sheet(cv::Rect(x, y + line - pictures[i].rows, pictures[i].cols, pictures[i].rows)));
     if (column == across - 1 || i + 1 == pictures.size()) y += line + kMarginPx;
   }
-  legend.copyTo(sheet(cv::Rect(kMarginPx, y, legend.cols, legend.rows)));
+  if (!legend.empty()) legend.copyTo(sheet(cv::Rect(kMarginPx, y, legend.cols, legend.rows)));
   return sheet;
 }
 
