@@ -4,7 +4,9 @@
 
 #include <cmath>
 #include <map>
+#include <optional>
 #include <span>
+#include <stdexcept>
 
 #include "filters/metrics.h"
 #include "manifests/enumerators.h"
@@ -58,7 +60,7 @@ class Gatherer {
       const std::span<CandidateFacts> candidates = std::span(facts.candidates).subspan(first, count);
       if (!read_tables(unit, candidates)) {
         ++units_without_tables_;
-        read_shard(unit, candidates);
+        read_shards(candidates);
       }
     }
     if (units_without_tables_ > 0) {
@@ -105,12 +107,23 @@ class Gatherer {
     facts.betas = label.betas;
   }
 
-  void read_shard(std::int64_t unit, std::span<CandidateFacts> candidates) {
+  // The shards of a version that was made from others hold other candidates than its units, so the verdicts
+  // say where a label lies.
+  void read_shards(std::span<CandidateFacts> candidates) {
     std::optional<manifests::ShardReader> shard;  // opened when a row of it is wanted
+    std::int64_t opened = 0;
     for (CandidateFacts& facts : candidates) {
       if (!facts.row.label) continue;
-      if (!shard) shard.emplace(dataset_.open_shard(dataset_.shard_of_unit(unit)));
+      if (!shard || opened != facts.row.label->shard) {
+        opened = facts.row.label->shard;
+        shard.emplace(dataset_.open_shard(dataset_.shard_of_unit(opened)));
+      }
       const manifests::ShardSample sample = shard->samples(facts.row.label->row, 1).front();
+      if (sample.record.id != facts.row.id) {
+        throw std::runtime_error(fmt::format("{}: row {} is {}, not {}, as verdicts.csv says; run `verify`",
+                                             dataset_.shard_file(dataset_.shard_of_unit(opened)).string(),
+                                             facts.row.label->row, sample.record.id, facts.row.id));
+      }
       set_geometry(facts, sample.record);
       facts.image_w_px = sample.image_width_px;
       facts.image_h_px = sample.image_height_px;

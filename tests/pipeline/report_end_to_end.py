@@ -118,6 +118,20 @@ class Report(Case):
 
     # --- the page
 
+    def test_a_part_of_a_dataset_has_a_report(self):
+        """Its shards hold other candidates than the units of the build did."""
+        run("subset", self.out, "--where", "verdict = refined", "--out", self.folder, "--name", "part")
+        part, = self.folder.glob("part-*")
+        run("report", part, "--out", self.folder / "pages", "--gallery", 0)
+        numbers = json.loads((self.folder / "pages/statistics.json").read_text())
+        visible = [0] * 27
+        for path in sorted((part / "shards").glob("*.h5")):
+            with h5py.File(path) as shard:
+                for weights in shard["keypoints_weight"][:]:
+                    visible[int((weights > 0).sum())] += 1
+        self.assertEqual(numbers["visible"]["kept"], visible)
+        self.assertEqual(sum(visible), sum(row["verdict"] == "refined" for row in self.rows))
+
     def test_the_page_needs_no_other_file(self):
         text = self.page.read_text()
         head = text[: text.index('id="statistics"')]
