@@ -49,6 +49,8 @@ Command add_corrections(CLI::App& app) {
                "{} pictures compared: {} keypoints of {} samples corrected, {} samples vetoed\n  {}\n  {}\n",
                changes.pictures, points, changes.points.size(), changes.vetoes.size(),
                (arguments->out / "corrections.tsv").string(), (arguments->out / "veto.txt").string());
+    fmt::print(stderr, "next: quadruped3d build with the config of before and --corrections {} --veto {}\n",
+               (arguments->out / "corrections.tsv").string(), (arguments->out / "veto.txt").string());
     if (arguments->json) {
       const nlohmann::ordered_json document = {{"pictures", changes.pictures},
                                                {"corrected_samples", changes.points.size()},

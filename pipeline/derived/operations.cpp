@@ -1,5 +1,7 @@
 #include "pipeline/derived/operations.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <set>
 #include <unordered_set>
@@ -62,6 +64,13 @@ DerivedVersion subset(const fs::path& version_folder, const std::string& where, 
   std::vector<VerdictRow> rows = selection.dataset.verdicts();
   for (VerdictRow& row : rows) {
     if (condition({row, selection.dataset.label_kind(row)})) selection.rows.push_back(std::move(row));
+  }
+  if (selection.rows.empty()) {
+    throw run::ConfigError(
+        fmt::format("--where \"{}\": none of the {} candidates of {} fulfils it, so there is nothing to "
+                    "write; `quadruped3d "
+                    "inspect {}` lists what they are",
+                    where, rows.size(), selection.dataset.version_name(), version_folder.string()));
   }
   const std::string subset_name = name.empty() ? selection.dataset.manifest().name : name;
   std::vector<Selection> selections;

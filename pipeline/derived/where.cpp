@@ -1,11 +1,14 @@
 #include "pipeline/derived/where.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
 #include <map>
+#include <span>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -106,7 +109,8 @@ class Parser {
 
   Condition parse() {
     Condition whole = condition();
-    if (next_ < tokens_.size()) fail("\"and\", \"or\" or the end");
+    if (next_ < tokens_.size())
+      fail("\"and\", \"or\" or the end; a value with spaces stands between double quotes");
     return whole;
   }
 
@@ -158,7 +162,10 @@ class Parser {
     ++next_;
     const std::string sign = take_operator(number != number_fields().end());
     if (next_ >= tokens_.size()) fail("a value");
-    if (text != text_fields().end()) return compare_text(text->second, sign, tokens_[next_++].text);
+    if (text != text_fields().end()) {
+      check_name(field);
+      return compare_text(text->second, sign, tokens_[next_++].text);
+    }
     return compare_number(number->second, sign);
   }
 
@@ -177,6 +184,17 @@ class Parser {
       if (is_number && take(sign)) return std::string(sign);
     }
     fail(is_number ? "=, !=, <, <=, > or >=" : "= or !=, since the field holds texts");
+  }
+
+  // Fields with few names are compared with one of these, or with "" where there may be none.
+  void check_name(const std::string& field) const {
+    const std::string& value = tokens_[next_].text;
+    std::span<const std::string_view> names;
+    if (field == "verdict") names = manifests::verdict_names();
+    if (field == "reason") names = manifests::reason_names();
+    if (field == "label_kind") names = manifests::label_kind_names();
+    if (names.empty() || value.empty() || std::ranges::find(names, value) != names.end()) return;
+    fail(fmt::format("one of {}", fmt::join(names, ", ")));
   }
 
   static Condition compare_text(const TextOf& get, const std::string& sign, const std::string& value) {

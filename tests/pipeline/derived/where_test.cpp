@@ -67,6 +67,10 @@ TEST_F(Where, MistakesAreToldWithTheirPlace) {
   EXPECT_THAT(message("species > fox"), HasSubstr("got \">\" at character 9, expected = or !="));
   EXPECT_THAT(message("trust > high"), HasSubstr("got \"high\" at character 9, expected a number"));
   EXPECT_THAT(message("species = red fox"), HasSubstr("got \"fox\" at character 15"));
+  EXPECT_THAT(message("species = red fox"), HasSubstr("a value with spaces stands between double quotes"));
+  EXPECT_THAT(message("verdict = kept"),
+              HasSubstr("got \"kept\" at character 11, expected one of retained, "));
+  EXPECT_THAT(message("label_kind != \"\" and reason = none"), HasSubstr("nothing thrown"));
   EXPECT_THAT(message("(trust > 1"), HasSubstr("got the end at character 11, expected \")\""));
   EXPECT_THAT(message("species ="), HasSubstr("expected a value"));
   EXPECT_THAT(message("species = \"red fox"), HasSubstr("has no closing quote"));
