@@ -49,7 +49,10 @@ class MemoryFile {
   struct Memory {
     std::byte* bytes = nullptr;
     std::size_t allocated = 0;
+    Memory() = default;
     ~Memory();
+    Memory(const Memory&) = delete;
+    Memory& operator=(const Memory&) = delete;
   };
   static H5FD_file_image_callbacks_t callbacks(Memory* memory);
   // Makes a contiguous dataset whose values are still to be written.
