@@ -6,9 +6,9 @@
 namespace q3d::pipeline::stages {
 namespace {
 
-constexpr std::array<std::string_view, 7> kNames{"ingest",  "predict", "fidelity", "refine",
-                                                 "measure", "crops",   "shards"};
-static_assert(kNames.size() == kStages.size());
+constexpr manifests::EnumNames kNames("stage", Stage::ingest, Stage::shards,
+                                      {"ingest", "predict", "fidelity", "refine", "measure", "crops",
+                                       "shards"});
 constexpr std::array<std::string StageKeys::*, 7> kKeys{
     &StageKeys::ingest,  &StageKeys::predict, &StageKeys::fidelity, &StageKeys::refine,
     &StageKeys::measure, &StageKeys::crops,   &StageKeys::shards};
@@ -16,15 +16,15 @@ constexpr std::array<std::string StageKeys::*, 7> kKeys{
 }  // namespace
 
 std::string_view to_string(Stage stage) {
-  return kNames.at(static_cast<std::size_t>(stage));
+  return kNames.name(stage);
 }
 
 Stage stage_from_string(std::string_view name) {
-  return manifests::enum_from_name<Stage>("stage", name, kNames);
+  return kNames.value(name);
 }
 
 std::span<const std::string_view> stage_names() {
-  return kNames;
+  return kNames.all();
 }
 
 const std::string& key_of(const StageKeys& keys, Stage stage) {
