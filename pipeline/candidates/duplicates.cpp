@@ -39,6 +39,25 @@ bool is_same_animal(const Candidate& a, const Candidate& b) {
                     is_same_point);
 }
 
+// Whether two samples of one picture look like labels of one animal by two people: most of the keypoints that
+// both have lie within a twentieth of the box's longer side.
+bool is_nearly_same_animal(const Candidate& a, const Candidate& b) {
+  constexpr double kNear = 0.05;
+  constexpr int kFewest = 3;
+  if (a.role != b.role || a.record.orientation != b.record.orientation) return false;
+  const double reach_px = kNear * std::max(a.record.box.w_px, a.record.box.h_px);
+  int common = 0;
+  int near = 0;
+  for (std::size_t i = 0; i < a.record.keypoints.size(); ++i) {
+    const Keypoint& p = a.record.keypoints[i];
+    const Keypoint& q = b.record.keypoints[i];
+    if (!(p.weight > 0.0F && q.weight > 0.0F)) continue;
+    ++common;
+    near += std::hypot(p.x_px - q.x_px, p.y_px - q.y_px) <= reach_px ? 1 : 0;
+  }
+  return common >= kFewest && 2 * near > common;
+}
+
 struct Repeated {
   std::size_t count = 0;
   std::string first;
@@ -49,12 +68,21 @@ struct Repeated {
 void fail_duplicates(std::vector<Candidate>& candidates, std::vector<IngestNote>& notes) {
   std::unordered_map<std::string, std::vector<const Candidate*>> of_picture;  // by SHA-256
   std::map<std::string, Repeated> repeated;                                   // by dataset
+  std::map<std::string, Repeated> nearly_repeated;
   for (Candidate& candidate : candidates) {
     if (candidate.record.failure != manifests::Reason::none || candidate.image_sha256.empty()) continue;
     std::vector<const Candidate*>& earlier = of_picture[candidate.image_sha256];
     const auto found = std::find_if(earlier.begin(), earlier.end(),
                                     [&](const Candidate* each) { return is_same_animal(*each, candidate); });
     if (found == earlier.end()) {
+      const auto near = std::find_if(earlier.begin(), earlier.end(), [&](const Candidate* each) {
+        return is_nearly_same_animal(*each, candidate);
+      });
+      if (near != earlier.end()) {
+        Repeated& here = nearly_repeated[candidate.record.dataset + "/" + candidate.record.split];
+        if (here.count++ == 0)
+          here.first = fmt::format("{} after {}", candidate.record.id, (*near)->record.id);
+      }
       earlier.push_back(&candidate);
       continue;
     }
@@ -68,6 +96,13 @@ void fail_duplicates(std::vector<Candidate>& candidates, std::vector<IngestNote>
         {loaders::formats::NoteKind::caution, dataset,
          fmt::format("duplicates: samples with the picture and the keypoints of an earlier one, which "
                      "is counted once: {}, first {}",
+                     each.count, each.first)});
+  }
+  for (const auto& [dataset, each] : nearly_repeated) {
+    notes.push_back(
+        {loaders::formats::NoteKind::caution, dataset,
+         fmt::format("samples that look like the same animal in the same picture as an earlier one, as "
+                     "if two people had labelled it; all are kept, so it counts twice: {}, first {}",
                      each.count, each.first)});
   }
 }

@@ -17,6 +17,8 @@ constexpr double kSlackPx = 2.0;
 constexpr double kBoxSlack = 0.1;       // of the box's longer side; annotators draw boxes and points apart
 constexpr double kSmallestBoxPx = 5.0;  // of the longer side
 constexpr double kLargestFraction = 1.0 + 1e-6;
+constexpr double kFractionReach = 1.5;  // of normalised keypoints from the middle, 0.5
+constexpr double kOnePlacePx = 1.0;
 
 bool is_visible(const Keypoint& point) {
   return point.weight > 0.0F;
@@ -38,6 +40,17 @@ int count_outside(const SampleRecord& record, const Box& rectangle, double slack
       }));
 }
 
+bool are_in_one_place(const SampleRecord& record) {
+  const Keypoint* first = nullptr;
+  for (const Keypoint& point : record.keypoints) {
+    if (!is_visible(point)) continue;
+    if (first == nullptr) first = &point;
+    if (std::max(std::abs(point.x_px - first->x_px), std::abs(point.y_px - first->y_px)) > kOnePlacePx)
+      return false;
+  }
+  return true;
+}
+
 std::string text(const Box& box) {
   return fmt::format("x {}, y {}, width {}, height {}", box.x_px, box.y_px, box.w_px, box.h_px);
 }
@@ -50,14 +63,17 @@ int keypoints_outside(const SampleRecord& record, int width_px, int height_px) {
 
 std::optional<LabelProblem> find_label_problem(const SampleRecord& record, int width_px, int height_px) {
   const auto visible = std::count_if(record.keypoints.begin(), record.keypoints.end(), is_visible);
+  // Points of an animal that is cut off by the border lie a little beside 0 to 1.
   const bool are_fractions =
       visible > 1 && std::all_of(record.keypoints.begin(), record.keypoints.end(), [](const Keypoint& point) {
-        return !is_visible(point) || (is_fraction(point.x_px) && is_fraction(point.y_px));
+        return !is_visible(point) ||
+               std::max(std::abs(point.x_px - 0.5), std::abs(point.y_px - 0.5)) <= kFractionReach;
       });
   if (are_fractions) {
     return LabelProblem{
         Reason::not_in_pixels,
-        fmt::format("keypoints: all {} visible ones are between 0 and 1, which are normalised coordinates; "
+        fmt::format("keypoints: all {} visible ones are between 0 and 1, or nearly so, which are normalised "
+                    "coordinates; "
                     "expected pixels: multiply x by the picture's width, {}, and y by its height, {}",
                     visible, width_px, height_px)};
   }
@@ -68,6 +84,11 @@ std::optional<LabelProblem> find_label_problem(const SampleRecord& record, int w
         fmt::format("box: got {}, which is between 0 and 1 (normalised); expected pixels of a "
                     "picture of {} x {}",
                     text(box), width_px, height_px)};
+  }
+  if (visible > 2 && are_in_one_place(record)) {
+    return LabelProblem{
+        Reason::keypoints_outside,
+        fmt::format("all {} visible keypoints lie in one place, which no animal's do", visible)};
   }
   const double longer_side_px = std::max(box.w_px, box.h_px);
   if (longer_side_px < kSmallestBoxPx) {

@@ -176,7 +176,8 @@ std::string_view sentence(Reason reason) {
     case Reason::no_visible_keypoints:
       return "No annotated keypoint is visible, so there is nothing to compare a label with.";
     case Reason::keypoints_outside:
-      return "Most annotated keypoints lie outside the picture or outside their box.";
+      return "Most annotated keypoints lie outside the picture or outside their box, or all lie in one "
+             "place.";
     case Reason::not_in_pixels:
       return "The annotation gives fractions of the picture's size where pixels are expected.";
     case Reason::record_malformed:

@@ -67,5 +67,28 @@ TEST(Duplicates, labels_of_another_role_and_failed_ones_do_not_count) {
   EXPECT_EQ(reasons({failed, candidate("2")}), (std::vector{Reason::size_mismatch, Reason::none}));
 }
 
+// Five keypoints of an animal in a box of 100 px, moved by `dx_px`.
+Candidate animal(const std::string& id, double dx_px) {
+  Candidate made = candidate(id);
+  made.record.box = {0.0, 0.0, 100.0, 60.0};
+  for (std::size_t i = 0; i < 5; ++i) made.record.keypoints[i] = {10.0 * i + dx_px, 20.0, 2.0F, 1.0F};
+  return made;
+}
+
+TEST(Duplicates, an_animal_that_two_people_labelled_is_told_and_kept) {
+  std::vector<IngestNote> notes;
+  EXPECT_EQ(reasons({animal("1", 0.0), animal("2", 4.0)}, &notes), (std::vector{Reason::none, Reason::none}));
+  ASSERT_EQ(notes.size(), 1U);
+  EXPECT_EQ(notes[0].kind, loaders::formats::NoteKind::caution);
+  EXPECT_THAT(notes[0].text, HasSubstr("so it counts twice: 1, first 2 after 1"));
+  notes.clear();
+  EXPECT_EQ(reasons({animal("1", 0.0), animal("2", 6.0)}, &notes), (std::vector{Reason::none, Reason::none}));
+  EXPECT_EQ(notes.size(), 0U) << "two animals side by side";
+  Candidate own = animal("2", 4.0);
+  own.role = config::Role::truth;
+  reasons({animal("1", 0.0), own}, &notes);
+  EXPECT_EQ(notes.size(), 0U) << "the labels of another role";
+}
+
 }  // namespace
 }  // namespace q3d::pipeline::candidates

@@ -76,5 +76,22 @@ TEST(LabelChecks, boxes_of_a_few_pixels) {
   EXPECT_EQ(reason_of(small), Reason::keypoints_outside);
 }
 
+TEST(LabelChecks, normalised_points_may_lie_a_little_beside_0_to_1) {
+  SampleRecord normalised = record();
+  for (std::size_t i = 0; i < 10; ++i) normalised.keypoints[i] = {-0.2 + 0.15 * i, 0.1 * i, 2.0F, 1.0F};
+  normalised.box = {0.0, 0.0, 150.0, 100.0};
+  EXPECT_EQ(reason_of(normalised), Reason::not_in_pixels);
+}
+
+TEST(LabelChecks, points_that_nobody_moved_from_one_place_fail) {
+  SampleRecord heap = record();
+  for (std::size_t i = 0; i < 10; ++i) heap.keypoints[i] = {50.0, 40.0 + 0.1 * i, 2.0F, 1.0F};
+  EXPECT_EQ(reason_of(heap), Reason::keypoints_outside);
+  heap.keypoints[9].x_px = 60.0;
+  EXPECT_EQ(reason_of(heap), Reason::none);
+  for (std::size_t i = 2; i < 10; ++i) heap.keypoints[i].weight = 0.0F;
+  EXPECT_EQ(reason_of(heap), Reason::none) << "two points alone may lie close together";
+}
+
 }  // namespace
 }  // namespace q3d::pipeline::candidates
