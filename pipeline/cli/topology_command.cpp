@@ -5,6 +5,8 @@
 
 #include <cstdio>
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "loaders/keypoints/builtin_topologies.h"
 #include "loaders/keypoints/topology_file.h"
@@ -101,9 +103,10 @@ int run(const Arguments& arguments) {
   if (out.empty()) fmt::print("{}", draft.text);
   if (!arguments.sheet.sheet.empty()) return draw_sheet(arguments, out);
   if (!out.empty() && !draft.survey.format.empty()) {
-    fmt::print(stderr, "next: {}\n",
-               run::command_line({"topology", "--from", from.string(), "--topology", out.string(), "--sheet",
-                                  "sheet.png"}));
+    std::vector<std::string> words{"topology", "--from", from.string(), "--topology", out.string()};
+    if (!draft.images.empty()) words.insert(words.end(), {"--images", draft.images.string()});
+    words.insert(words.end(), {"--sheet", "sheet.png"});
+    fmt::print(stderr, "next: {}\n", run::command_line(words));
   }
   return 0;
 }

@@ -9,10 +9,13 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "loaders/pictures/encode.h"
 #include "loaders/pictures/image.h"
 #include "manifests/atomic_file.h"
+#include "pipeline/report/lettering.h"
 
 namespace q3d::pipeline::report {
 namespace {
@@ -20,15 +23,14 @@ namespace {
 using manifests::SampleRecord;
 
 constexpr int kTilePx = 560;  // side of a tile
-constexpr int kCaptionPx = 40;
+constexpr int kGapPx = 6;     // between tiles
+constexpr int kLegendPx = 30;
+constexpr int kCaptionPx = 24;
 constexpr int kColumns = 3;
+constexpr int kDotPx = 5;
 constexpr double kMargin = 0.25;  // of the box's longer side, shown around it
-constexpr double kFontScale = 0.42;
-const cv::Scalar kLeft(70, 150, 255);
-const cv::Scalar kRight(255, 150, 30);
-const cv::Scalar kMiddle(255, 255, 255);
+constexpr TextSize kText = TextSize::small;
 const cv::Scalar kPaper(24, 24, 24);
-const cv::Scalar kInk(235, 235, 235);
 
 // A square part of the picture, scaled to a tile.
 struct View {
@@ -42,63 +44,122 @@ struct View {
   }
 };
 
-View view_of(const manifests::Box& box) {
-  const double side = std::max({box.w_px, box.h_px, 1.0}) * (1.0 + 2.0 * kMargin);
-  return {box.x_px + box.w_px / 2.0 - side / 2.0, box.y_px + box.h_px / 2.0 - side / 2.0, kTilePx / side};
+// Returns where a part of this length begins: around `centre`, and inside the whole as far as there is room.
+double start_of(double centre, double part, double whole) {
+  return part >= whole ? (whole - part) / 2.0 : std::clamp(centre - part / 2.0, 0.0, whole - part);
 }
 
-cv::Mat tile_of(const SampleRecord& record, const View& view) {
-  const loaders::pictures::DecodedImage decoded = loaders::pictures::decode_image(record.image_path);
-  if (decoded.failure != manifests::Reason::none) {
-    throw std::runtime_error(fmt::format("{}: {}", record.image_path, decoded.detail));
-  }
+View view_of(const manifests::Box& box, cv::Size picture) {
+  const double side = std::max({box.w_px, box.h_px, 1.0}) * (1.0 + 2.0 * kMargin);
+  return {start_of(box.x_px + box.w_px / 2.0, side, picture.width),
+          start_of(box.y_px + box.h_px / 2.0, side, picture.height), kTilePx / side};
+}
+
+cv::Mat decoded_picture(const SampleRecord& record) {
+  loaders::pictures::DecodedImage decoded = loaders::pictures::decode_image(record.image_path);
+  if (decoded.failure == manifests::Reason::none) return std::move(decoded.rgb);
+  throw std::runtime_error(fmt::format("{}: {}", record.image_path, decoded.detail));
+}
+
+cv::Mat tile_of(const cv::Mat& picture, const View& view) {
   const cv::Point2d origin = view.to_tile(0.0, 0.0);
   const cv::Matx23d tile_from_image(view.tile_px_per_px, 0.0, origin.x, 0.0, view.tile_px_per_px, origin.y);
   cv::Mat tile;
-  cv::warpAffine(decoded.rgb, tile, tile_from_image, {kTilePx, kTilePx}, cv::INTER_LINEAR,
-                 cv::BORDER_CONSTANT, kPaper);
+  cv::warpAffine(picture, tile, tile_from_image, {kTilePx, kTilePx}, cv::INTER_LINEAR, cv::BORDER_CONSTANT,
+                 kPaper);
   return tile;
 }
 
 const cv::Scalar& colour_of(std::string_view keypoint) {
-  if (keypoint.starts_with("left_")) return kLeft;
-  return keypoint.starts_with("right_") ? kRight : kMiddle;
+  if (keypoint.starts_with("left_")) return colours::kBlue;
+  return keypoint.starts_with("right_") ? colours::kOrange : colours::kWhite;
 }
 
-// Texts that would cover each other are moved down until they do not.
-cv::Point free_place(cv::Point place, cv::Size size, std::vector<cv::Rect>& taken) {
-  place.x = std::clamp(place.x, 0, std::max(0, kTilePx - size.width));
-  cv::Rect room(place.x, place.y - size.height, size.width, size.height);
-  const auto is_taken = [&] {
-    return std::any_of(taken.begin(), taken.end(),
-                       [&](const cv::Rect& other) { return (other & room).area() > 0; });
-  };
-  while (is_taken() && room.y + room.height < kTilePx) ++room.y;
-  taken.push_back(room);
-  return {room.x, room.y + room.height};
-}
+// A keypoint on its tile, with the user's name for it.
+struct Mark {
+  cv::Point place;
+  std::string name;
+  cv::Scalar colour;
+};
 
-void write_text(cv::Mat& image, const std::string& text, cv::Point place, const cv::Scalar& colour) {
-  cv::putText(image, text, place, cv::FONT_HERSHEY_SIMPLEX, kFontScale, kPaper, 3, cv::LINE_AA);
-  cv::putText(image, text, place, cv::FONT_HERSHEY_SIMPLEX, kFontScale, colour, 1, cv::LINE_AA);
-}
-
-void draw_keypoints(cv::Mat& tile, const View& view, const SampleRecord& record,
-                    const loaders::keypoints::Topology& topology) {
+std::vector<Mark> marks_of(const SampleRecord& record, const View& view,
+                           const loaders::keypoints::Topology& topology) {
   const std::vector<std::string>& names = loaders::keypoints::topology("animal3d26").keypoints;
-  std::vector<cv::Rect> taken;
+  std::vector<Mark> marks;
   for (std::size_t k = 0; k < names.size(); ++k) {
     const manifests::Keypoint& point = record.keypoints[k];
     if (!(point.weight > 0.0F) || topology.source[k] < 0) continue;
-    const cv::Point place = view.to_tile(point.x_px, point.y_px);
-    const cv::Scalar& colour = colour_of(names[k]);
-    cv::circle(tile, place, 5, kPaper, cv::FILLED, cv::LINE_AA);
-    cv::circle(tile, place, 4, colour, cv::FILLED, cv::LINE_AA);
-    const std::string& text = topology.keypoints[static_cast<std::size_t>(topology.source[k])];
-    int baseline = 0;
-    const cv::Size size = cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, kFontScale, 1, &baseline);
-    const cv::Size room(size.width, size.height + baseline);
-    write_text(tile, text, free_place(place + cv::Point(7, 4), room, taken), colour);
+    marks.push_back({view.to_tile(point.x_px, point.y_px),
+                     topology.keypoints[static_cast<std::size_t>(topology.source[k])], colour_of(names[k])});
+  }
+  return marks;
+}
+
+// Returns a place for a text near a dot that covers no dot and no other text: beside the dot if there is
+// room, else on growing rings around it. The first place is taken if there is none.
+cv::Rect free_place(cv::Point dot, cv::Size size, const std::vector<cv::Rect>& taken) {
+  const cv::Rect tile(0, 0, kTilePx, kTilePx);
+  constexpr int kReachPx = kDotPx + 3;
+  const auto is_free = [&](const cv::Rect& room) {
+    return (room & tile) == room && std::none_of(taken.begin(), taken.end(), [&](const cv::Rect& other) {
+             return (other & room).area() > 0;
+           });
+  };
+  const cv::Rect beside(dot.x + kReachPx, dot.y - size.height / 2, size.width, size.height);
+  constexpr int kFarthestPx = 120;
+  for (int ring = 0; ring <= kFarthestPx; ring += 6) {
+    const int right = dot.x + kReachPx + ring;
+    const int left = dot.x - kReachPx - ring - size.width;
+    const int above = dot.y - kReachPx - ring - size.height;
+    const int below = dot.y + kReachPx + ring;
+    for (const cv::Point corner :
+         {cv::Point(right, beside.y), cv::Point(left, beside.y), cv::Point(dot.x - size.width / 2, below),
+          cv::Point(dot.x - size.width / 2, above), cv::Point(right, below), cv::Point(right, above),
+          cv::Point(left, below), cv::Point(left, above)}) {
+      const cv::Rect room(corner, size);
+      if (is_free(room)) return room;
+    }
+  }
+  return beside;
+}
+
+// Connects a text with its dot where it does not lie beside it.
+void draw_leader(cv::Mat& tile, const Mark& mark, const cv::Rect& room) {
+  const cv::Point end(std::clamp(mark.place.x, room.x, room.x + room.width),
+                      std::clamp(mark.place.y, room.y, room.y + room.height));
+  if (cv::norm(end - mark.place) <= 2.0 * kDotPx) return;
+  cv::line(tile, mark.place, end, kPaper, 3, cv::LINE_AA);
+  cv::line(tile, mark.place, end, mark.colour, 1, cv::LINE_AA);
+}
+
+void draw_keypoints(cv::Mat& tile, const std::vector<Mark>& marks) {
+  std::vector<cv::Rect> taken;
+  for (const Mark& mark : marks) {
+    taken.emplace_back(mark.place - cv::Point(kDotPx, kDotPx), cv::Size(2 * kDotPx + 1, 2 * kDotPx + 1));
+  }
+  std::vector<cv::Rect> rooms;
+  for (const Mark& mark : marks) {
+    rooms.push_back(free_place(mark.place, {text_width_px(mark.name, kText), line_height_px(kText)}, taken));
+    taken.push_back(rooms.back());
+  }
+  for (std::size_t i = 0; i < marks.size(); ++i) draw_leader(tile, marks[i], rooms[i]);
+  for (const Mark& mark : marks) {
+    cv::circle(tile, mark.place, kDotPx, kPaper, cv::FILLED, cv::LINE_AA);
+    cv::circle(tile, mark.place, kDotPx - 1, mark.colour, cv::FILLED, cv::LINE_AA);
+  }
+  for (std::size_t i = 0; i < marks.size(); ++i) {
+    write_on_photo(tile, marks[i].name, rooms[i].tl(), kText, marks[i].colour);
+  }
+}
+
+void draw_legend(cv::Mat& sheet) {
+  int x = kGapPx;
+  for (const auto& [text, colour] :
+       {std::pair{"the animal's own left", colours::kBlue},
+        std::pair{"the animal's own right", colours::kOrange}, std::pair{"neither", colours::kWhite}}) {
+    cv::circle(sheet, {x + kDotPx, kLegendPx / 2}, kDotPx, colour, cv::FILLED, cv::LINE_AA);
+    write(sheet, text, {x + 3 * kDotPx, (kLegendPx - line_height_px(kText)) / 2}, kText, colour);
+    x += 3 * kDotPx + text_width_px(text, kText) + 24;
   }
 }
 
@@ -114,17 +175,18 @@ void write_label_sheet(const std::filesystem::path& path, const std::vector<Samp
   if (records.empty()) throw std::runtime_error("there is no animal to draw");
   const int across = std::min(kColumns, static_cast<int>(records.size()));
   const int down = (static_cast<int>(records.size()) + across - 1) / across;
-  cv::Mat sheet(down * (kTilePx + kCaptionPx), across * kTilePx, CV_8UC3, kPaper);
+  constexpr int kStepPx = kTilePx + kGapPx;
+  cv::Mat sheet(kLegendPx + down * (kStepPx + kCaptionPx), across * kStepPx + kGapPx, CV_8UC3, kPaper);
+  draw_legend(sheet);
   for (std::size_t i = 0; i < records.size(); ++i) {
-    const View view = view_of(records[i].box);
-    cv::Mat tile = tile_of(records[i], view);
-    draw_keypoints(tile, view, records[i], topology);
-    const int x = static_cast<int>(i) % across * kTilePx;
-    const int y = static_cast<int>(i) / across * (kTilePx + kCaptionPx);
+    const cv::Mat picture = decoded_picture(records[i]);
+    const View view = view_of(records[i].box, picture.size());
+    cv::Mat tile = tile_of(picture, view);
+    draw_keypoints(tile, marks_of(records[i], view, topology));
+    const int x = kGapPx + static_cast<int>(i) % across * kStepPx;
+    const int y = kLegendPx + static_cast<int>(i) / across * (kStepPx + kCaptionPx);
     tile.copyTo(sheet(cv::Rect(x, y, kTilePx, kTilePx)));
-    write_text(sheet, shortened(records[i].image_ref), {x + 6, y + kTilePx + 16}, kInk);
-    write_text(sheet, "the animal's left", {x + 6, y + kTilePx + 33}, kLeft);
-    write_text(sheet, "the animal's right", {x + 150, y + kTilePx + 33}, kRight);
+    write(sheet, shortened(records[i].image_ref), {x, y + kTilePx + 3}, kText, colours::kWhite);
   }
   const std::vector<std::byte> png = loaders::pictures::encode_png(sheet);
   manifests::write_file_atomically(path, {reinterpret_cast<const char*>(png.data()), png.size()});

@@ -3,8 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <stdexcept>
+#include <system_error>
 
 #include "loaders/formats/dataset.h"
 #include "loaders/keypoints/topology_file.h"
@@ -35,6 +38,28 @@ std::vector<SampleRecord> spread(const std::vector<SampleRecord>& records, int c
   return chosen;
 }
 
+bool is_picture(const fs::path& file) {
+  std::string ending = file.extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char c) { return std::tolower(c); });
+  return ending == ".jpg" || ending == ".jpeg" || ending == ".png";
+}
+
+// Returns the only folder below the labels' folder that holds pictures itself, relative to the latter; empty
+// if there are several, or if the labels' folder holds some too.
+fs::path only_folder_of_pictures(const fs::path& labels) {
+  const fs::path top = folder_of(labels);
+  std::set<fs::path> folders;
+  std::error_code error;
+  const auto options = fs::directory_options::skip_permission_denied;
+  for (fs::recursive_directory_iterator it(top, options, error), end; !error && it != end;
+       it.increment(error)) {
+    if (is_picture(it->path())) folders.insert(it->path().parent_path().lexically_relative(top));
+    if (folders.size() > 1) return {};
+  }
+  return folders.empty() || *folders.begin() == "." ? fs::path() : *folders.begin();
+}
+
 }  // namespace
 
 Draft draft_topology(const DraftOptions& options) {
@@ -45,6 +70,8 @@ Draft draft_topology(const DraftOptions& options) {
                     options.out.string()));
   }
   Draft draft{loaders::formats::survey_labels(options.from), {}, {}};
+  // A project of DeepLabCut has its pictures where its labels say.
+  if (!fs::is_directory(options.from)) draft.images = only_folder_of_pictures(options.from);
   const std::string name = options.name.empty() ? draft.survey.file.stem().string() : options.name;
   draft.guess = loaders::keypoints::guess_topology(name, draft.survey.names);
   const std::string about = fmt::format(
@@ -75,10 +102,11 @@ std::vector<loaders::formats::Note> draw_label_sheet(const SheetOptions& options
   const loaders::formats::Dataset loaded = loaders::formats::load_dataset(dataset);
   const std::vector<SampleRecord> chosen = spread(loaded.records, options.count);
   if (chosen.empty()) {
-    throw std::runtime_error(
-        fmt::format("{}: no animal can be drawn{}{}", options.labels.string(),
-                    loaded.records.empty() ? ", because there is none" : "; the first one: ",
-                    loaded.records.empty() ? std::string() : loaded.records.front().failure_detail));
+    throw std::runtime_error(fmt::format(
+        "{}: no animal can be drawn{}{}. --images names the folder of the pictures, and --root the "
+        "folder that their names count from",
+        options.labels.string(), loaded.records.empty() ? ", because there is none" : "; the first one: ",
+        loaded.records.empty() ? std::string() : loaded.records.front().failure_detail));
   }
   report::write_label_sheet(options.sheet, chosen, loaders::keypoints::read_topology_file(options.topology));
   return loaded.notes;

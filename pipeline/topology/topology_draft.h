@@ -22,6 +22,8 @@ struct Draft {
   loaders::formats::LabelSurvey survey;
   loaders::keypoints::TopologyGuess guess;
   std::string text;  // the topology file
+  std::filesystem::path
+      images{};  // the one folder of pictures below the labels' folder; empty: none, or several
 };
 
 // Reads the names of the keypoints, guesses a topology and writes it. Throws ConfigError if the file to write
