@@ -49,12 +49,13 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   static const auto topology = scratch.write("topology.json", kTopology);
   // The formats' own folders, with the pictures that the corpus names. They are looked for, not read.
   static const bool has_pictures = [] {
-    for (const char* name : {"a.jpg", "images/a.jpg", "dataset/AAAA/1.jpg"}) scratch.write(name, "");
+    for (const char* name : {"a.jpg", "images/a.jpg", "dataset/AAAA/1.jpg", "Images/a.jpg"})
+      scratch.write(name, "");
     return true;
   }();
   require(has_pictures, "pictures are there");
   const auto file = scratch.write("train.json", q3d::fuzz::as_text(data, size));
-  for (const char* format : {"prima", "superanimal", "animal_kingdom", "coco"}) {
+  for (const char* format : {"prima", "superanimal", "animal_kingdom", "stanfordextra", "badja", "coco"}) {
     q3d::loaders::formats::DatasetOptions options{.name = "set",
                                                   .format = format,
                                                   .split = "train",
