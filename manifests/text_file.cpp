@@ -45,9 +45,10 @@ std::string named_markup(std::string_view content) {
   constexpr std::size_t kShown = 1024;
   std::string start(content.substr(0, kShown));
   std::transform(start.begin(), start.end(), start.begin(), [](unsigned char c) { return std::tolower(c); });
-  if (start.starts_with("<?xml") && start.find("<html") == std::string::npos) {
+  const bool is_xml = start.starts_with("<?xml") || start.starts_with("<annotation");
+  if (is_xml && start.find("<html") == std::string::npos) {
     return start.find("<annotations>") == std::string::npos
-               ? "an XML file"
+               ? "an XML file, such as Pascal VOC's: export the labels as COCO Keypoints instead"
                : "an XML file as CVAT writes it: export the task as COCO Keypoints instead";
   }
   return "an HTML page (a web page that was saved in the place of the file): download the file again";

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "loaders/formats/coco.h"
+#include "loaders/formats/other_tools.h"
 #include "manifests/json_file.h"
 
 namespace q3d::loaders::formats {
@@ -86,6 +87,7 @@ SampleRecord read_mpii_record(const nlohmann::json& record, std::size_t index, L
 Dataset load_animal_kingdom(const DatasetOptions& options) {
   Loading loading(options, "dataset");
   const nlohmann::json document = manifests::read_json_file(loading.file);
+  refuse_other_form(document, options.format, loading.file);
   if (!document.is_array()) {
     const auto add = [](Loading& here, RecordReader& annotation, const CocoCategory&, SampleRecord& sample) {
       add_animal(here, annotation, sample);

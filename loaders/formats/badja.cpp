@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "loaders/formats/formats.h"
+#include "loaders/formats/other_tools.h"
 #include "loaders/keypoints/topology_file.h"
 #include "loaders/pictures/box.h"
 #include "manifests/json_file.h"
@@ -100,6 +101,7 @@ class BadjaLoader {
 
   void read_file(const fs::path& file) {
     const nlohmann::json document = manifests::read_json_file(file);
+    refuse_other_form(document, loading_.options.format, file);
     if (!document.is_array()) {
       throw std::runtime_error(fmt::format("{}: top level: got {}, expected BADJA's list of frames",
                                            file.string(), manifests::describe(document)));
@@ -115,6 +117,7 @@ class BadjaLoader {
     set_picture(loading_, reader, {{reader.text("image_path"), "image_path"}},
                 fmt::format("{}-{}", file.stem().string(), index), sample);
     const std::vector<Keypoint> points = read_joints(record, reader, topology_.keypoints.size());
+    note_placeholders(loading_, points, sample);
     sample.keypoints = keypoints::to_animal3d(topology_, points);
     check_visible(reader, "joints", sample);
     if (const auto box = pictures::box_around(points, loading_.options.box_margin)) sample.box = *box;

@@ -6,6 +6,7 @@
 #include <array>
 #include <limits>
 #include <stdexcept>
+#include <unordered_map>
 #include <unordered_set>
 #include <utility>
 
@@ -24,18 +25,43 @@ struct CocoFile {
   const json& annotations;
   const keypoints::Topology& topology;
   CocoCategories categories;
-  CocoIdMap<const json*> images{};  // an object, or a file name alone
-  bool ids_are_distinct = false;    // of the annotations
+  CocoIdMap<const json*> images{};                            // an object, or a file name alone
+  std::unordered_map<std::string, std::string> shared_ids{};  // key of an id that images share -> their names
+  bool ids_are_distinct = false;                              // of the annotations
 };
 
-// Indexes the images by id. If several have the same id, the first is used. Returns how many repeat an id.
-std::size_t index_images(const json& images, CocoFile& file) {
+std::string file_name_of(const json& image) {
+  if (image.is_string()) return image.get<std::string>();
+  const auto name = image.is_object() ? image.find("file_name") : image.end();
+  return name != image.end() && name->is_string() ? name->get<std::string>() : "(no file_name)";
+}
+
+// Indexes the images by id. If several of one picture have the same id, the first is used. If they are of
+// several pictures, as where files were joined, nobody can tell which one an annotation means.
+void index_images(const json& images, CocoFile& file, Loading& loading) {
   std::size_t repeated = 0;
   for (const auto& [key, image] : images.items()) {
     const std::optional<CocoId> id = images.is_object() ? coco_id_of_key(key) : coco_id(image, "id");
-    if (id && !file.images.add(*id, &image)) ++repeated;
+    if (!id || file.images.add(*id, &image)) continue;
+    const std::string first = file_name_of(**file.images.find(*id));
+    const std::string name = file_name_of(image);
+    if (name == first) {
+      ++repeated;
+    } else {
+      file.shared_ids.emplace(id->key(), fmt::format("{} and {}", first, name));
+    }
   }
-  return repeated;
+  if (repeated > 0) {
+    loading.notes.add(
+        fmt::format("images that repeat the id of an earlier image of the same name: {}", repeated));
+  }
+  if (!file.shared_ids.empty()) {
+    loading.notes.add(
+        fmt::format("ids that several pictures share, as where files were joined; their annotations fail, "
+                    "because nobody can tell which picture is meant: {}, first {} ({})",
+                    file.shared_ids.size(), file.shared_ids.begin()->first, file.shared_ids.begin()->second),
+        NoteKind::caution);
+  }
 }
 
 const json& images_of(const json& document, const Loading& loading) {
@@ -71,17 +97,12 @@ void index_annotations(CocoFile& file, Loading& loading) {
 }
 
 CocoFile index_file(const json& document, const keypoints::Topology& topology, Loading& loading) {
-  if (const std::string tool = known_tool(document); !tool.empty()) {
-    throw std::runtime_error(fmt::format("{}: got {}", loading.file.string(), tool));
-  }
+  refuse_other_form(document, loading.options.format, loading.file);
   const json& images = images_of(document, loading);
   CocoFile file{.annotations = manifests::array_of(document, "annotations", loading.file),
                 .topology = topology,
                 .categories = CocoCategories(document, topology, loading)};
-  if (const std::size_t repeated = index_images(images, file); repeated > 0) {
-    loading.notes.add(fmt::format(
-        "images that repeat the id of an earlier image (the first image of an id is used): {}", repeated));
-  }
+  index_images(images, file, loading);
   index_annotations(file, loading);
   return file;
 }
@@ -118,6 +139,11 @@ void read_image(CocoFile& file, std::size_t index, Loading& loading, RecordReade
     return;
   }
   const json& listed = **found;
+  if (const auto shared = file.shared_ids.find(id->key()); shared != file.shared_ids.end()) {
+    annotation.fail(Reason::record_malformed, "image_id",
+                    fmt::format("{}, which the images {} share", id->key(), shared->second),
+                    "an id that one image has; give the images of joined files ids of their own");
+  }
   if (listed.is_string()) {
     set_picture(loading, annotation, {{listed.get<std::string>(), "image_id"}}, part, sample);
     return;
@@ -129,16 +155,18 @@ void read_image(CocoFile& file, std::size_t index, Loading& loading, RecordReade
   sample.source = image.optional_text("source_dataset");
 }
 
-// Returns whether `bbox` says anything. Tools write zeros, null or an empty list where nobody drew a box.
-bool has_box(const json& annotation) {
-  const auto box = annotation.is_object() ? annotation.find("bbox") : annotation.end();
-  if (box == annotation.end() || box->is_null()) return false;
-  if (!box->is_array()) return true;
-  const auto is_nothing = [](const json& value) {
-    return value.is_null() || (value.is_number() && value.get<double>() == 0.0);
-  };
-  return !std::all_of(box->begin(), box->end(), is_nothing) &&
-         !(box->size() == 4 && is_nothing((*box)[2]) && is_nothing((*box)[3]));
+// COCO's v is 0, 1 or 2, and estimators write a confidence of up to 1 there.
+void note_large_v(std::span<const manifests::Keypoint> keypoints, const SampleRecord& sample,
+                  Loading& loading) {
+  const auto large = std::find_if(keypoints.begin(), keypoints.end(),
+                                  [](const manifests::Keypoint& point) { return point.v > 2.0F; });
+  if (large == keypoints.end()) return;
+  loading.notes.count(
+      fmt::format(
+          "keypoints whose v is above 2 (such as {}), which COCO does not have, count as labelled by hand; "
+          "if v is a confidence, write it from 0 to 1",
+          large->v),
+      sample.id, NoteKind::caution);
 }
 
 // Reads an annotation. If it has no box and the rules allow it, returns a box around the keypoints;
@@ -148,7 +176,7 @@ std::optional<manifests::Box> read_annotation(CocoFile& file, std::size_t index,
                                               SampleRecord& sample) {
   read_image(file, index, loading, annotation, sample);
   const json& record = file.annotations[index];
-  const bool makes_box = rules.box_margin && !has_box(record);
+  const bool makes_box = rules.box_margin && !annotation.has_box("bbox");
   if (!makes_box) sample.box = annotation.box("bbox");  // the four numbers as they stand
   const CocoCategory* category = file.categories.of(record);
   if (category == nullptr) {
@@ -160,6 +188,7 @@ std::optional<manifests::Box> read_annotation(CocoFile& file, std::size_t index,
   const std::vector<manifests::Keypoint> in_file =
       annotation.keypoints("keypoints", category->keypoints.size());
   note_placeholders(loading, in_file, sample);
+  note_large_v(in_file, sample, loading);
   std::vector<manifests::Keypoint> points = keypoints::in_topology_order(category->match, in_file);
   if (rules.weigh) rules.weigh(points);
   sample.keypoints = keypoints::to_animal3d(file.topology, points);
@@ -196,10 +225,7 @@ void settle_boxes(Loading& loading, const CocoRules& rules,
   for (std::size_t i = 0; i < records.size(); ++i) {
     if (made_boxes[i]) {
       records[i].box = *made_boxes[i];
-      loading.notes.count(fmt::format("no box: it was made around the keypoints, with a margin of {} of its "
-                                      "longer side",
-                                      *rules.box_margin),
-                          records[i].id);
+      note_made_box(loading, *rules.box_margin, records[i]);
     } else if (vote.is_corners()) {
       records[i].box = pictures::box_from_corners(records[i].box);
     }

@@ -59,10 +59,19 @@ CocoCategories::CocoCategories(const json& document, const keypoints::Topology& 
   if (categories != document.end() && categories->is_array()) {
     for (const json& category : *categories) {
       if (!category.is_object()) continue;
-      if (const auto id = coco_id(category, "id")) place_of_id_.add(*id, list_.size());
-      list_.push_back({.name = text_in(category, "name"),
-                       .supercategory = text_in(category, "supercategory"),
-                       .keypoints = keypoint_names(category)});
+      CocoCategory read{.name = text_in(category, "name"),
+                        .supercategory = text_in(category, "supercategory"),
+                        .keypoints = keypoint_names(category)};
+      const auto id = coco_id(category, "id");
+      if (id && !place_of_id_.add(*id, list_.size())) {
+        const CocoCategory& first = list_[*place_of_id_.find(*id)];
+        if (first.name == read.name && first.keypoints == read.keypoints) continue;
+        throw std::runtime_error(
+            fmt::format("{}: categories: got the id {} for both \"{}\" and \"{}\", expected an id for each, "
+                        "because an annotation's keypoints are read by it",
+                        loading.file.string(), id->key(), first.name, read.name));
+      }
+      list_.push_back(std::move(read));
     }
   }
   choose(loading.options.categories, loading);

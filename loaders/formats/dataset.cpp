@@ -120,6 +120,21 @@ void note_placeholders(Loading& loading, std::span<const manifests::Keypoint> ke
       sample.id, NoteKind::caution);
 }
 
+void note_made_box(Loading& loading, double margin, const SampleRecord& sample) {
+  loading.notes.count(
+      fmt::format("no box: it was made around the keypoints, with a margin of {} of its longer side", margin),
+      sample.id);
+}
+
+manifests::Box read_or_make_box(Loading& loading, RecordReader& reader, const std::string& field,
+                                std::span<const manifests::Keypoint> keypoints, const SampleRecord& sample) {
+  const double margin = loading.options.box_margin;
+  const auto made = reader.has_box(field) ? std::nullopt : pictures::box_around(keypoints, margin);
+  if (!made) return reader.box(field);
+  note_made_box(loading, margin, sample);
+  return *made;
+}
+
 void check_box(RecordReader& reader, const std::string& field, const SampleRecord& sample) {
   if (reader.failed()) return;
   if (const auto problem = pictures::find_box_problem(sample.box, sample.width_px, sample.height_px)) {

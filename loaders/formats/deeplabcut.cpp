@@ -153,7 +153,7 @@ class DeepLabCutLoader {
     if (const std::string note = weights_.note(); !note.empty()) loading_.notes.add(note);
     if (loading_.options.species.empty()) {
       loading_.notes.add(
-          "DeepLabCut's files state no species; set the key \"species\" of the dataset to give one");
+          "files of this format state no species; set the key \"species\" of the dataset to give one");
     }
     return finished(loading_, std::move(records_));
   }
@@ -163,11 +163,13 @@ class DeepLabCutLoader {
   std::vector<fs::path> label_files() {
     const fs::path given = loading_.file;
     if (!fs::is_directory(given)) return {given};
+    is_project_ = true;
     return project_label_files(given, loading_.options.root, loading_.notes);
   }
 
   void read_file(const fs::path& file) {
     const LabelTable table = read_label_table(file);
+    if (is_project_) compare_with_csv(table, file);
     std::set<std::string> bodypart_notes;
     const std::vector<Individual> individuals =
         individuals_of(table, topology_, file, loading_.notes, bodypart_notes);
@@ -187,19 +189,64 @@ class DeepLabCutLoader {
     }
   }
 
+  // DeepLabCut writes each table twice, and people who edit one of the two expect their labels to count.
+  void compare_with_csv(const LabelTable& table, const fs::path& file) {
+    const fs::path csv = fs::path(file).replace_extension(".csv");
+    if (csv == file || !fs::is_regular_file(csv)) return;
+    std::string difference;
+    try {
+      difference = difference_of(table, read_label_csv(csv));
+    } catch (const std::runtime_error&) {
+      difference = "which cannot be read";
+    }
+    loading_.more_files.push_back(csv);
+    if (difference.empty()) return;
+    loading_.notes.add(
+        fmt::format(
+            "{} is read, and not {}, {}. If the .csv is right, name it in \"annotations\", or remove the "
+            ".h5",
+            name_for_people(file), csv.filename().string(), difference),
+        NoteKind::caution);
+  }
+
   // A row's picture: its name for the sample's id, and the folder in which to look for it first.
   struct PicturePlace {
     std::string name;
     fs::path beside{};  // empty: by the name as it stands
   };
 
+  // Frames of several videos have the same numbers, so each video's pictures lie in a folder of its name.
   std::vector<PicturePlace> numbered_pictures(const LabelTable& table, const fs::path& file) {
-    std::vector<PicturePlace> pictures;
-    if (table.rows.empty()) return pictures;
-    const fs::path folder = loading_.options.root / loading_.options.images;
+    const std::size_t videos = std::max<std::size_t>(table.videos.size(), 1);
+    std::vector<PicturePlace> pictures(table.rows.size());
+    for (std::size_t video = 0; video < videos; ++video) {
+      std::vector<std::size_t> places;
+      for (std::size_t row = 0; row < table.rows.size(); ++row) {
+        if (videos == 1 || table.video_of_row[row] == video) places.push_back(row);
+      }
+      const std::string folder = videos == 1 ? std::string() : table.videos[video].name;
+      number_pictures(table, places, folder, file, pictures);
+    }
+    if (videos > 1) {
+      loading_.notes.add(
+          fmt::format("{}: the frames of its {} videos are looked for in folders that have the "
+                      "videos' names, below \"images\"",
+                      name_for_people(file), videos));
+    }
+    return pictures;
+  }
+
+  // Sets the pictures of the rows at `places`, which lie in `subfolder` of the folder of pictures.
+  void number_pictures(const LabelTable& table, const std::vector<std::size_t>& places,
+                       const std::string& subfolder, const fs::path& file,
+                       std::vector<PicturePlace>& pictures) {
+    if (places.empty()) return;
+    std::vector<std::string> rows;
+    for (const std::size_t place : places) rows.push_back(table.rows[place]);
+    const fs::path folder = loading_.options.root / loading_.options.images / subfolder;
     const NumberedPictures numbered(folder);
     const std::optional<int> first_frame = loading_.options.first_frame;
-    if (const std::string doubt = numbered.doubt(table.rows); !first_frame && !doubt.empty()) {
+    if (const std::string doubt = numbered.doubt(rows); !first_frame && !doubt.empty()) {
       throw std::runtime_error(fmt::format(
           "{}: got {} in {}, so it is not certain which picture shows which frame; expected pictures with "
           "the frames' own numbers. Set the key \"first_frame\" of the dataset to the number of the picture "
@@ -207,13 +254,24 @@ class DeepLabCutLoader {
           "numbers",
           file.string(), doubt, folder.string()));
     }
+    if (!first_frame && numbered.may_be_every_nth(rows)) {
+      loading_.notes.add(
+          fmt::format(
+              "{}: {} has fewer pictures than there are frames, numbered from 0 without a gap. They are "
+              "taken "
+              "for the first frames. If they are every n-th frame of the video, the labels lie on the wrong "
+              "pictures: give the pictures the frames' own numbers",
+              name_for_people(file), folder.lexically_normal().string()),
+          NoteKind::caution);
+    }
     loading_.notes.add(fmt::format(
         "{}: the rows are frame numbers; each row takes the picture in \"images\" "
         "whose name ends in its number{}",
         name_for_people(file), first_frame ? fmt::format(" plus first_frame {}", *first_frame) : ""));
-    for (const std::string& row : table.rows)
-      pictures.push_back({numbered.name_of(row, first_frame.value_or(0))});
-    return pictures;
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      const std::string name = numbered.name_of(rows[i], first_frame.value_or(0));
+      pictures[places[i]] = {subfolder.empty() ? name : subfolder + "/" + name};
+    }
   }
 
   // DeepLabCut keeps the labels of a folder of pictures in that folder, so pictures are looked for there
@@ -264,6 +322,11 @@ class DeepLabCutLoader {
     }
     set_found_picture(loading_, reader, {picture.name, "picture"}, find_picture(picture), annotations_.back(),
                       sample);
+    if (!table.video_of_row.empty()) {
+      const LabelVideo& video = table.videos[table.video_of_row[row]];
+      sample.width_px = video.width_px;
+      sample.height_px = video.height_px;
+    }
     note_placeholders(loading_, points, sample);
     weights_.apply(points);
     sample.keypoints = keypoints::to_animal3d(topology_, points);
@@ -293,6 +356,7 @@ class DeepLabCutLoader {
   std::vector<SampleRecord> records_;
   std::vector<std::string> annotations_;  // the last part of each record's id
   std::size_t absent_ = 0;
+  bool is_project_ = false;  // the labels are those of a folder
 };
 
 }  // namespace

@@ -52,6 +52,15 @@ void set_found_picture(Loading& loading, RecordReader& reader, const PictureName
 void note_placeholders(Loading& loading, std::span<const manifests::Keypoint> keypoints,
                        const manifests::SampleRecord& sample);
 
+// Notes that a sample's box was made around its keypoints with this margin (box_around).
+void note_made_box(Loading& loading, double margin, const manifests::SampleRecord& sample);
+
+// Reads a record's box. If none is stated, it is made around these keypoints with the margin of the dataset's
+// options, with a note; without a visible keypoint the record fails with `box_missing`.
+manifests::Box read_or_make_box(Loading& loading, RecordReader& reader, const std::string& field,
+                                std::span<const manifests::Keypoint> keypoints,
+                                const manifests::SampleRecord& sample);
+
 // These fail samples whose box has no area or lies outside the image, and samples without a visible keypoint.
 void check_box(RecordReader& reader, const std::string& field, const manifests::SampleRecord& sample);
 void check_visible(RecordReader& reader, const std::string& field, const manifests::SampleRecord& sample);

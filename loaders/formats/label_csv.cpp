@@ -63,6 +63,14 @@ std::string known_table(std::string_view first_cell) {
   if (first_cell == "track" || first_cell == "frame_idx" || first_cell == "instance.score") {
     return " (SLEAP's analysis CSV begins with \"track\" too, but has the columns frame_idx and nose.x)";
   }
+  if (first_cell.starts_with('{') || first_cell.starts_with('[')) {
+    return " (this is JSON; if it is COCO's, use \"format\": \"coco\")";
+  }
+  if (first_cell.ends_with(':') || first_cell.find(": ") != std::string_view::npos) {
+    return " (this looks like YAML, such as a project's config.yaml, which holds no labels: name the folder "
+           "labeled-data or one of its CollectedData files)";
+  }
+  if (first_cell.starts_with("sep=")) return " (Excel's own first line: remove it)";
   if (first_cell.find(' ') != std::string_view::npos &&
       first_cell.find_first_not_of("0123456789.- eE") == std::string_view::npos) {
     return " (these are lines of numbers, as YOLO writes them: export the labels as COCO Keypoints instead)";
@@ -160,9 +168,41 @@ std::string name_of_row(const Cells& cells, std::size_t name_cells) {
   return row_name(parts);
 }
 
+// DeepLabCut writes x, y and perhaps likelihood of a keypoint side by side; pandas may have sorted them.
+// Where it is otherwise, a row of the header has slipped against the others, and every label would be taken
+// for another keypoint or for the other coordinate.
+void check_groups(const CsvReader& lines, const std::vector<LabelColumn>& columns) {
+  for (std::size_t first = 0, end = 0; first < columns.size(); first = end) {
+    std::vector<std::string> coordinates;
+    const auto is_same = [&](const LabelColumn& column) {
+      return column.individual == columns[first].individual && column.bodypart == columns[first].bodypart;
+    };
+    for (end = first; end < columns.size() && is_same(columns[end]); ++end) {
+      coordinates.push_back(columns[end].coordinate);
+    }
+    const bool are_known = coordinates == Cells{"x", "y"} || coordinates == Cells{"x", "y", "likelihood"} ||
+                           coordinates == Cells{"likelihood", "x", "y"};
+    if (are_known) continue;
+    const LabelColumn& column = columns[first];
+    lines.fail(
+        fmt::format("the columns {} for {}{}{} side by side", fmt::join(coordinates, ", "), column.individual,
+                    column.individual.empty() ? "" : " ", column.bodypart),
+        "x, y or x, y, likelihood for each keypoint; one row of the header seems to have slipped against "
+        "the others");
+  }
+}
+
 bool are_blank(const Cells& cells) {
   return std::all_of(cells.begin(), cells.end(),
                      [](const std::string& cell) { return trimmed(cell).empty(); });
+}
+
+// pandas writes the name of a table's index below the header, in a line that is empty otherwise.
+bool is_index_name(const Cells& cells, const Header& header) {
+  if (header.name_cells != 1 || cells.empty()) return false;
+  const std::string_view name = trimmed(cells[0]);
+  return !name.empty() && name.find_first_of("./\\") == std::string_view::npos &&
+         !is_number(std::string(name)) && are_blank({cells.begin() + 1, cells.end()});
 }
 
 }  // namespace
@@ -185,7 +225,9 @@ LabelTable read_label_csv(const std::filesystem::path& file) {
         label_column(std::move(names), fmt::format("{}: column {}", file.string(), column)));
     places.push_back(column);
   }
+  check_groups(lines, table.columns);
   table.rows_are_numbers = header.name_cells == 1;
+  if (is_index_name(cells, header) && !lines.next(cells)) cells.clear();
   for (bool more = !cells.empty(); more; more = lines.next(cells)) {
     if (are_blank(cells)) continue;
     // pandas fills short rows up with missing values.

@@ -309,12 +309,17 @@ std::string packed(const LabelTable& table) {
   for (const LabelColumn& column : table.columns) {
     columns.push_back({column.scorer, column.individual, column.bodypart, column.coordinate});
   }
+  nlohmann::json videos = nlohmann::json::array();
+  for (const LabelVideo& video : table.videos)
+    videos.push_back({video.name, video.width_px, video.height_px});
   const auto* values = reinterpret_cast<const std::uint8_t*>(table.values.data());
   std::string bytes;
   nlohmann::json::to_cbor(
       {{"columns", std::move(columns)},
        {"rows", table.rows},
        {"rows_are_numbers", table.rows_are_numbers},
+       {"videos", std::move(videos)},
+       {"video_of_row", table.video_of_row},
        {"values", nlohmann::json::binary({values, values + table.values.size() * sizeof(double)})}},
       bytes);
   return bytes;
@@ -328,6 +333,10 @@ LabelTable unpacked(const std::string& bytes) {
   }
   table.rows = object.at("rows").get<std::vector<std::string>>();
   table.rows_are_numbers = object.at("rows_are_numbers");
+  for (const nlohmann::json& video : object.at("videos")) {
+    table.videos.push_back({video.at(0), video.at(1), video.at(2)});
+  }
+  table.video_of_row = object.at("video_of_row").get<std::vector<std::size_t>>();
   const auto& values = object.at("values").get_binary();
   table.values.resize(values.size() / sizeof(double));
   if (!values.empty()) std::memcpy(table.values.data(), values.data(), values.size());

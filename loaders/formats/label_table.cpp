@@ -10,6 +10,7 @@
 #include <string_view>
 #include <utility>
 
+#include "loaders/formats/folded_name.h"
 #include "manifests/file_descriptor.h"
 
 namespace q3d::loaders::formats {
@@ -29,8 +30,27 @@ bool is_hdf5(const std::filesystem::path& file) {
   }
 }
 
+namespace {
+
+// Names become parts of ids and notes, which are written as JSON.
+void require_utf8(const LabelTable& table, const std::filesystem::path& file) {
+  const bool are_columns =
+      std::all_of(table.columns.begin(), table.columns.end(), [](const LabelColumn& column) {
+        return is_utf8(column.scorer) && is_utf8(column.individual) && is_utf8(column.bodypart);
+      });
+  if (are_columns && std::all_of(table.rows.begin(), table.rows.end(), is_utf8)) return;
+  throw std::runtime_error(fmt::format(
+      "{}: got a name of a {} with bytes that are no UTF-8, expected the encoding UTF-8: save the file "
+      "with it (\"CSV UTF-8\" in Excel)",
+      file.string(), are_columns ? "picture" : "keypoint, an individual or a scorer"));
+}
+
+}  // namespace
+
 LabelTable read_label_table(const std::filesystem::path& file) {
-  return is_hdf5(file) ? read_label_hdf5(file) : read_label_csv(file);
+  LabelTable table = is_hdf5(file) ? read_label_hdf5(file) : read_label_csv(file);
+  require_utf8(table, file);
+  return table;
 }
 
 LabelColumn label_column(std::vector<std::string> names, const std::string& where) {

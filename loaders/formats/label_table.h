@@ -17,13 +17,22 @@ struct LabelColumn {
   std::string coordinate;  // x, y or likelihood
 };
 
+// A video that the table's frames are of, as far as the file says.
+struct LabelVideo {
+  std::string name;  // of its file, without folders and extension
+  int width_px = 0;  // 0: unknown
+  int height_px = 0;
+};
+
 struct LabelTable {
   std::vector<LabelColumn> columns;
   // The name of each row: a picture's name with its folders, which the file may keep in several parts, or the
   // number of a frame.
   std::vector<std::string> rows;
   bool rows_are_numbers = false;
-  std::vector<double> values;  // (rows, columns), px; NaN where nothing was labelled
+  std::vector<double> values;               // (rows, columns), px; NaN where nothing was labelled
+  std::vector<LabelVideo> videos{};         // empty if the file names none
+  std::vector<std::size_t> video_of_row{};  // an index into the videos for each row; empty without videos
 
   double at(std::size_t row, std::size_t column) const { return values[row * columns.size() + column]; }
 };
@@ -41,6 +50,10 @@ LabelTable read_label_hdf5(const std::filesystem::path& file);
 
 // Reads HDF5 in this process, for fuzzing, which cannot see another process.
 LabelTable read_label_hdf5_here(const std::filesystem::path& file);
+
+// Says in what `other`, the same labels in another file, differs from `table`: in rows, or in numbers by more
+// than 0.5 px ("which differs from it in 2 numbers, ..."). Returns "" if it does not.
+std::string difference_of(const LabelTable& table, const LabelTable& other);
 
 // Makes a column of its names, scorer first, as the file's levels give them: three, or four with individuals.
 // Throws std::runtime_error that names `where` for another number of names.

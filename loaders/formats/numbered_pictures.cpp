@@ -56,6 +56,12 @@ std::string NumberedPictures::doubt(const std::vector<std::string>& rows) const 
                      *frames.begin(), *frames.rbegin(), names_.size(), first, last);
 }
 
+bool NumberedPictures::may_be_every_nth(const std::vector<std::string>& rows) const {
+  const std::set<std::string> frames(rows.begin(), rows.end());
+  return names_.size() > 1 && names_.size() < frames.size() && names_.begin()->first == 0 &&
+         names_.rbegin()->first + 1 == static_cast<std::int64_t>(names_.size());
+}
+
 std::string NumberedPictures::name_of(const std::string& row, int first_frame) const {
   const auto found = names_.find(number_in(row) + first_frame);
   return found == names_.end() || found->second.size() != 1 ? row : *found->second.begin();

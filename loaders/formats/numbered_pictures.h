@@ -23,6 +23,10 @@ class NumberedPictures {
   // if a frame has no picture while there are as many pictures as frames, or pictures of other numbers.
   std::string doubt(const std::vector<std::string>& rows) const;
 
+  // Whether the pictures are numbered from 0 without a gap, and are fewer than the frames. They may be the
+  // first frames, or every n-th one with a new number; their names do not tell.
+  bool may_be_every_nth(const std::vector<std::string>& rows) const;
+
   // Returns the picture of a frame, where `first_frame` is the number of the picture that shows frame 0. If
   // there is no such picture, or more than one, returns the number itself. No file has that name, so the
   // record fails.

@@ -79,6 +79,13 @@ std::optional<std::string> decoded(std::string_view text) {
   return has_any ? std::optional(result) : std::nullopt;
 }
 
+// Spreadsheets and scripts leave spaces around a name.
+std::string_view trimmed(std::string_view text) {
+  const std::size_t first = text.find_first_not_of(" \t\r\n");
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(" \t\r\n") - first + 1);
+}
+
 void add(std::vector<NameReading>& readings, NameReading reading) {
   if (reading.path.empty()) return;
   const bool is_known = std::any_of(readings.begin(), readings.end(), [&](const NameReading& each) {
@@ -146,6 +153,7 @@ std::vector<NameReading> readings_of(std::string_view name) {
   const PlainName plain = plain_name(name);
   add(readings, reading_of(plain.path, plain.is_absolute));
   for (const std::string& path : paths_in_query(plain.query)) add(readings, reading_of(path, true));
+  add(readings, reading_of(trimmed(plain.path), plain.is_absolute));
   if (const auto text = decoded(plain.path)) {
     const PlainName again = plain_name(*text);  // %5C is a backslash
     add(readings, reading_of(again.path, plain.is_absolute || again.is_absolute));

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "loaders/formats/formats.h"
+#include "loaders/formats/other_tools.h"
 #include "loaders/formats/several_animals.h"
 #include "manifests/json_file.h"
 
@@ -132,10 +133,10 @@ SampleRecord read_record(const nlohmann::json& record, const std::string& place,
     reader.fail(Reason::record_malformed, "bbox", fmt::format("boxes of {} animals", record["bbox"].size()),
                 "one record an animal, or keypoint_2d, pose and the other fields with one list an animal");
   }
-  sample.box = reader.box("bbox");
-  check_box(reader, "bbox", sample);
   const auto keypoints = reader.keypoints("keypoint_2d", kKeypoints);
   std::copy(keypoints.begin(), keypoints.end(), sample.keypoints.begin());
+  sample.box = read_or_make_box(loading, reader, "bbox", keypoints, sample);
+  check_box(reader, "bbox", sample);
   note_placeholders(loading, keypoints, sample);
   check_visible(reader, "keypoint_2d", sample);
   sample.truth = read_truth(record, reader, loading, sample.id);
@@ -149,6 +150,7 @@ SampleRecord read_record(const nlohmann::json& record, const std::string& place,
 Dataset load_prima(const DatasetOptions& options) {
   Loading loading(options, {});
   const nlohmann::json document = manifests::read_json_file(loading.file);
+  refuse_other_form(document, options.format, loading.file);
   const nlohmann::json& data = manifests::array_of(document, "data", loading.file);
   std::vector<SampleRecord> records;
   records.reserve(data.size());

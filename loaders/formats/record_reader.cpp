@@ -188,6 +188,18 @@ std::vector<manifests::Keypoint> RecordReader::keypoints(const std::string& fiel
   return points;
 }
 
+bool RecordReader::has_box(const std::string& field) const {
+  const nlohmann::json* box = find(field);
+  if (box == nullptr) return false;
+  if (box->is_string()) return !box->get_ref<const std::string&>().empty();
+  if (!box->is_array()) return true;
+  const auto is_nothing = [](const nlohmann::json& value) { return value.is_null() || value == 0.0; };
+  const auto is_minus_one = [](const nlohmann::json& value) { return value == -1.0; };
+  if (std::all_of(box->begin(), box->end(), is_nothing)) return false;
+  return box->size() != 4 || !((is_nothing((*box)[2]) && is_nothing((*box)[3])) ||
+                               std::all_of(box->begin(), box->end(), is_minus_one));
+}
+
 manifests::Box RecordReader::box(const std::string& field) {
   const std::vector<double> values = numbers(field, 4, 1, Reason::box_missing, Reason::record_malformed);
   if (values.empty()) return {};

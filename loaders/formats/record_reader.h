@@ -46,6 +46,8 @@ class RecordReader {
   // Returns x, y, v of `count` keypoints. The weight is 1 if v > 0 and the point is no placeholder, else 0.
   // Unlabelled points may have any coordinates.
   std::vector<manifests::Keypoint> keypoints(const std::string& field, std::size_t count);
+  // Whether a box is stated. Tools write zeros, -1, null, "" or an empty list where nobody drew one.
+  bool has_box(const std::string& field) const;
   // Returns four numbers as they stand, the last two as width and height.
   manifests::Box box(const std::string& field);
 

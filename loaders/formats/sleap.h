@@ -12,8 +12,8 @@ namespace q3d::loaders::formats {
 
 // A project or its predictions (.slp): labels made by hand, and predictions where nobody corrected them.
 // Returns nothing if the file is no .slp. Throws std::runtime_error that names the place, what was found and
-// what was expected. It refuses labels of several videos, because their frames have the same numbers, and
-// labels of several skeletons.
+// what was expected. The frames of several videos are told apart by the names of the videos, so it refuses
+// videos of one name, and labels of several skeletons.
 std::optional<LabelTable> read_sleap_labels(const ForeignHdf5& file);
 
 // An exported analysis (.h5): one video, a row for each of its frames that has an animal. Returns nothing if
@@ -32,7 +32,8 @@ class SleapTable {
   // `tracks` are the tracks' names; several of one name are told apart by their number.
   SleapTable(std::vector<std::string> nodes, const std::vector<std::string>& tracks);
 
-  void begin_frame(std::string name);
+  // `video` is an index into the videos that finish() is given.
+  void begin_frame(std::string name, std::size_t video = 0);
   struct Point {
     double x_px = 0.0;
     double y_px = 0.0;
@@ -43,9 +44,13 @@ class SleapTable {
   void add_animal(std::optional<std::size_t> track, const std::vector<Point>& points);
 
   // Returns the table. Frames without an animal have no row. A single individual has no name.
-  LabelTable finish(bool rows_are_numbers) const;
+  LabelTable finish(bool rows_are_numbers, std::vector<LabelVideo> videos = {}) const;
 
  private:
+  struct Frame {
+    std::string name;
+    std::size_t video;
+  };
   struct Animal {
     std::size_t row;
     std::size_t individual;
@@ -56,7 +61,7 @@ class SleapTable {
 
   std::vector<std::string> nodes_;
   std::vector<std::string> tracks_;
-  std::vector<std::string> rows_;
+  std::vector<Frame> rows_;
   std::vector<std::string> individuals_;
   std::vector<Animal> animals_;
   std::vector<std::size_t> in_frame_;  // individuals of the present frame

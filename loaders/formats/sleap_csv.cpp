@@ -49,6 +49,16 @@ struct Row {
   std::vector<SleapTable::Point> points;
 };
 
+// sleap-io writes the frames of all videos into one table.
+void require_one_video(const CsvTableReader& lines, const std::string& here, std::string& video) {
+  if (video.empty()) video = here;
+  if (here == video) return;
+  lines.fail(
+      fmt::format("frames of both {} and {}", video, here),
+      "the frames of one video, because those of several have the same numbers; export each video into a "
+      "file of its own");
+}
+
 }  // namespace
 
 bool is_sleap_csv(const std::string& text) {
@@ -75,9 +85,11 @@ LabelTable read_sleap_csv(const std::string& text, const std::string& where) {
     if (has(node + ".score")) columns.back().score = lines.column(node + ".score");
   }
   const std::size_t frame_column = lines.column("frame_idx");
+  std::string video;
   std::map<std::int64_t, std::vector<Row>> frames;
   std::vector<std::string> tracks;
   while (lines.next()) {
+    if (has("video_path")) require_one_video(lines, lines.cell(lines.column("video_path")), video);
     Row row;
     if (has("track") && !lines.cell(lines.column("track")).empty()) {
       row.track = lines.cell(lines.column("track"));

@@ -16,6 +16,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <filesystem>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -30,6 +32,7 @@ using nlohmann::json;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kCentredFormat = 1.1;
+constexpr std::uint64_t kLargestSidePx = 1'000'000;
 
 json parsed(const std::string& text, const std::string& where) {
   json value = json::parse(text, nullptr, /*allow_exceptions=*/false);
@@ -74,10 +77,13 @@ std::vector<std::string> track_names(const ForeignHdf5& file) {
   return names;
 }
 
+struct Video {
+  LabelVideo facts;
+  std::vector<std::string> pictures{};  // of a video that is a list of pictures
+};
+
 // Returns the pictures' names of a video that is a list of pictures; empty for any other video.
-std::vector<std::string> pictures_of(const std::string& video) {
-  const json document = parsed(video, "videos_json");
-  const json backend = document.is_object() ? document.value("backend", json::object()) : json::object();
+std::vector<std::string> pictures_of(const json& document, const json& backend) {
   for (const json* holder : {&backend, &document}) {
     for (const char* key : {"filename", "image_filenames", "filenames"}) {
       if (!holder->is_object() || !holder->contains(key) || !(*holder)[key].is_array()) continue;
@@ -89,6 +95,29 @@ std::vector<std::string> pictures_of(const std::string& video) {
     }
   }
   return {};
+}
+
+// A file states the size of a video as (frames, height, width, channels), or not at all.
+Video video_of(const std::string& text) {
+  const json document = parsed(text, "videos_json");
+  const json backend = document.is_object() ? document.value("backend", json::object()) : json::object();
+  Video video{{}, pictures_of(document, backend)};
+  const auto member = [&](const char* key) {
+    const json in_document = document.is_object() ? document.value(key, json()) : json();
+    return backend.is_object() ? backend.value(key, in_document) : in_document;
+  };
+  if (const json name = member("filename"); name.is_string()) {
+    video.facts.name = std::filesystem::path(row_name({name.get<std::string>()})).stem().string();
+  }
+  const json shape = member("shape");
+  if (!video.pictures.empty() || !shape.is_array() || shape.size() != 4) return video;
+  const auto side = [&](std::size_t i) {
+    const bool is_side = shape[i].is_number_unsigned() && shape[i].get<std::uint64_t>() <= kLargestSidePx;
+    return is_side ? shape[i].get<int>() : 0;
+  };
+  video.facts.height_px = side(1);
+  video.facts.width_px = side(2);
+  return video;
 }
 
 // The columns of the tables.
@@ -145,16 +174,20 @@ class LabelsReader {
 
   LabelTable read() {
     const json metadata = parsed(*file_.text_attribute("metadata", "json"), "metadata.json");
-    const std::size_t video = only_video();
+    const std::vector<Video> videos = used_videos();
     nodes_ = node_names(metadata, only_skeleton());
-    const std::vector<std::string> pictures = pictures_of(file_.texts("videos_json").at(video));
     SleapTable table(nodes_, track_names(file_));
     for (std::size_t i = 0; i < columns_.frame.size(); ++i) {
       const auto number = static_cast<std::int64_t>(columns_.frame[i]);
-      table.begin_frame(pictures.empty() ? std::to_string(number) : picture(pictures, number));
+      const std::size_t video = place_of_video(columns_.video[i]);
+      const std::vector<std::string>& pictures = videos[video].pictures;
+      table.begin_frame(pictures.empty() ? std::to_string(number) : picture(pictures, number), video);
       add_frame(i, table);
     }
-    return table.finish(/*rows_are_numbers=*/pictures.empty());
+    std::vector<LabelVideo> facts;
+    for (const Video& video : videos) facts.push_back(video.facts);
+    return table.finish(/*rows_are_numbers=*/videos.empty() || videos.front().pictures.empty(),
+                        std::move(facts));
   }
 
  private:
@@ -174,16 +207,29 @@ class LabelsReader {
     return {static_cast<std::size_t>(first), static_cast<std::size_t>(end)};
   }
 
-  std::size_t only_video() const {
-    const std::size_t videos = file_.texts("videos_json").size();
-    const std::set<double> used(columns_.video.begin(), columns_.video.end());
-    if (used.size() > 1) {
-      refuse("frames.video", fmt::format("labels of {} videos", used.size()),
-             "the labels of one video, because the frames of several videos have the same numbers; save the "
-             "labels of each video as a file of its own");
+  // The videos that frames are of, in the order of their numbers. The frames of several videos have the same
+  // numbers, so the videos' names must tell them apart.
+  std::vector<Video> used_videos() {
+    const std::vector<std::string> texts = file_.texts("videos_json");
+    used_ = {columns_.video.begin(), columns_.video.end()};
+    std::vector<Video> videos;
+    std::set<std::string> names;
+    for (const double number : used_) {
+      videos.push_back(video_of(texts.at(range(number, number + 1.0, texts.size(), "frames.video").first)));
+      names.insert(videos.back().facts.name);
     }
-    const double video = used.empty() ? 0.0 : *used.begin();
-    return range(video, video + 1.0, videos, "frames.video").first;
+    const auto lists = static_cast<std::size_t>(std::count_if(
+        videos.begin(), videos.end(), [](const Video& video) { return !video.pictures.empty(); }));
+    const bool are_told_apart = lists == 0 && names.size() == videos.size() && !names.contains("");
+    if (videos.size() < 2 || lists == videos.size() || are_told_apart) return videos;
+    refuse("frames.video", fmt::format("labels of the {} videos {}", videos.size(), fmt::join(names, ", ")),
+           "videos of different names, or lists of pictures alone, because the frames of several videos have "
+           "the same numbers; export each video's analysis as a file of its own");
+  }
+
+  // The place of a video among those that are used.
+  std::size_t place_of_video(double number) const {
+    return static_cast<std::size_t>(std::distance(used_.begin(), used_.find(number)));
   }
 
   std::size_t only_skeleton() const {
@@ -243,6 +289,7 @@ class LabelsReader {
   Points by_hand_;
   Points predicted_;
   std::vector<std::string> nodes_;
+  std::set<double> used_;  // numbers of the videos that frames are of
 };
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 #include "loaders/formats/sleap.h"
 
@@ -36,8 +37,8 @@ SleapTable::SleapTable(std::vector<std::string> nodes, const std::vector<std::st
   }
 }
 
-void SleapTable::begin_frame(std::string name) {
-  rows_.push_back(std::move(name));
+void SleapTable::begin_frame(std::string name, std::size_t video) {
+  rows_.push_back({std::move(name), video});
   in_frame_.clear();
 }
 
@@ -71,9 +72,10 @@ void SleapTable::add_animal(std::optional<std::size_t> track, const std::vector<
   animals_.push_back({rows_.size() - 1, individual, points});
 }
 
-LabelTable SleapTable::finish(bool rows_are_numbers) const {
+LabelTable SleapTable::finish(bool rows_are_numbers, std::vector<LabelVideo> videos) const {
   LabelTable table;
   table.rows_are_numbers = rows_are_numbers;
+  table.videos = std::move(videos);
   const bool is_single = individuals_.size() == 1;
   for (const std::string& individual : individuals_) {
     for (const std::string& node : nodes_) {
@@ -85,7 +87,8 @@ LabelTable SleapTable::finish(bool rows_are_numbers) const {
   for (const Animal& animal : animals_) {
     // Animals come in the order of their frames.
     const bool is_new = &animal == animals_.data() || (&animal - 1)->row != animal.row;
-    if (is_new) table.rows.push_back(rows_[animal.row]);
+    if (is_new) table.rows.push_back(rows_[animal.row].name);
+    if (is_new && !table.videos.empty()) table.video_of_row.push_back(rows_[animal.row].video);
     row_of_frame[animal.row] = table.rows.size() - 1;
   }
   if (!table.columns.empty() && table.rows.size() > kMostNumbers / table.columns.size()) {

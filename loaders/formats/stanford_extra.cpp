@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "loaders/formats/formats.h"
+#include "loaders/formats/other_tools.h"
 #include "loaders/keypoints/topology_file.h"
 #include "manifests/json_file.h"
 
@@ -33,9 +34,11 @@ SampleRecord read_dog(const nlohmann::json& record, std::size_t index, const key
   set_picture(loading, reader, {{reader.text("img_path"), "img_path"}}, std::to_string(index), sample);
   sample.width_px = reader.size_px("img_width");
   sample.height_px = reader.size_px("img_height");
-  sample.box = reader.box("img_bbox");
+  const std::vector<Keypoint> joints = read_joints(record, reader, topology.keypoints.size());
+  note_placeholders(loading, joints, sample);
+  sample.keypoints = keypoints::to_animal3d(topology, joints);
+  sample.box = read_or_make_box(loading, reader, "img_bbox", joints, sample);
   check_box(reader, "img_bbox", sample);
-  sample.keypoints = keypoints::to_animal3d(topology, read_joints(record, reader, topology.keypoints.size()));
   check_visible(reader, "joints", sample);
   sample.species = kSpecies;
   set_family(loading, std::nullopt, species::family_of_species(sample.species), sample);
@@ -48,6 +51,7 @@ Dataset load_stanford_extra(const DatasetOptions& options) {
   Loading loading(options, "Images");
   const keypoints::Topology topology = keypoints::read_topology_file("stanfordextra");
   const nlohmann::json document = manifests::read_json_file(loading.file);
+  refuse_other_form(document, options.format, loading.file);
   if (!document.is_array()) {
     throw std::runtime_error(fmt::format("{}: top level: got {}, expected StanfordExtra's list of records",
                                          loading.file.string(), manifests::describe(document)));

@@ -47,7 +47,12 @@ class Reader {
     if (!document_.is_object()) fail("top level", manifests::describe(document_), "an object");
     for (const auto& [key, value] : document_.items()) {
       if (std::find(kKeys.begin(), kKeys.end(), key) != kKeys.end()) continue;
-      fail("top level", fmt::format("the key \"{}\"", key), fmt::format("one of {}", fmt::join(kKeys, ", ")));
+      const bool is_coco = document_.contains("images") && document_.contains("annotations");
+      fail("top level", fmt::format("the key \"{}\"", key),
+           fmt::format("one of {}{}", fmt::join(kKeys, ", "),
+                       is_coco ? ". This is a COCO file of labels, no topology; `quadruped3d topology --from "
+                                 "FILE` makes one from it"
+                               : ""));
     }
   }
 

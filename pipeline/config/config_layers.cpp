@@ -3,11 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <stdexcept>
 
-#include "manifests/atomic_file.h"
 #include "manifests/file_descriptor.h"
 #include "manifests/json_keys.h"
 #include "manifests/spelling.h"
+#include "manifests/text_file.h"
 #include "pipeline/config/config_override.h"
 #include "pipeline/config/json_depth.h"
 #include "pipeline/run/errors.h"
@@ -20,15 +21,18 @@ namespace fs = std::filesystem;
 
 json read_json(const fs::path& file) {
   try {
-    return json::parse(manifests::read_file(file),
-                       manifests::refuse_repeated_keys<json>(refuse_depth(file.string())), true,
+    const std::string text = manifests::read_text_file(file, "a config in JSON");
+    return json::parse(text, manifests::refuse_repeated_keys<json>(refuse_depth(file.string())), true,
                        /*ignore_comments=*/true);
   } catch (const manifests::RepeatedKey& error) {
     throw run::ConfigError(fmt::format("{}: {}", file.string(), error.what()));
   } catch (const json::exception& error) {  // also numbers beyond double, which are no parse_error
     throw run::ConfigError(fmt::format("{}: not valid JSON: {}", file.string(), error.what()));
-  } catch (const manifests::IoError& error) {
-    if (!error.names_no_file()) throw;
+  } catch (const manifests::IoError&) {
+    throw;
+  } catch (const run::ConfigError&) {
+    throw;
+  } catch (const std::runtime_error& error) {  // there is no such file, or it is no text
     throw run::ConfigError(error.what());
   }
 }

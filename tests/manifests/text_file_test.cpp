@@ -67,9 +67,9 @@ TEST_F(TextFile, names_what_is_not_the_file_itself) {
         Other{"version https://git-lfs.github.com/spec/v1\noid sha256:1\n", "`git lfs pull`"},
         Other{"\n<!DOCTYPE html><html>", "an HTML page"}, Other{"<HTML>", "an HTML page"},
         Other{"<?xml version=\"1.0\"?><annotations>", "CVAT"},
-        Other{"<?xml version=\"1.0\"?><a>", "an XML file"}, Other{"PK\3\4...", "a ZIP archive"},
-        Other{"\x1f\x8b...", "a gzip archive"}, Other{"\x80\x04...", "a Python pickle"},
-        Other{"\x89HDF\r\n\x1a\n", "an HDF5 file"}}) {
+        Other{"<?xml version=\"1.0\"?><a>", "an XML file"}, Other{"<annotation><folder>", "Pascal VOC"},
+        Other{"PK\3\4...", "a ZIP archive"}, Other{"\x1f\x8b...", "a gzip archive"},
+        Other{"\x80\x04...", "a Python pickle"}, Other{"\x89HDF\r\n\x1a\n", "an HDF5 file"}}) {
     const std::string said = refusal(each.content);
     EXPECT_THAT(said, HasSubstr(each.says));
     EXPECT_THAT(said, HasSubstr("labels.csv: got "));

@@ -245,7 +245,7 @@ class EndToEnd(Case):
         invisible[:, 2] = 0
         minus_one[:] = -1
         for label, reason, changes in [
-                ("zero box", "box_zero_size", {"bbox": [10, 10, 0, 0]}),
+                ("zero box", "box_zero_size", {"bbox": [10, 10, 0, 40]}),
                 ("outside", "box_outside_image", {"bbox": [5000, 10, 50, 50]}),
                 ("nan box", "box_not_finite", {"bbox": [10, float("nan"), 50, 50]}),
                 ("invisible", "no_visible_keypoints", {"keypoint_2d": invisible.tolist()}),

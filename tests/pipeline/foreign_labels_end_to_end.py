@@ -38,7 +38,8 @@ class SlpFile:
     """Collects frames of instances, and writes them as a .slp."""
 
     def __init__(self, tracks=(), video={"backend": {"filename": "clip.mp4"}}, format_id=1.2, videos=1):
-        self.tracks, self.video, self.format_id, self.videos = list(tracks), video, format_id, videos
+        self.tracks, self.format_id = list(tracks), format_id
+        self.videos = video if isinstance(video, list) else [video] * videos
         self.frames, self.instances, self.points, self.pred_points = [], [], [], []
 
     def frame(self, index, animals, video=0):
@@ -61,7 +62,7 @@ class SlpFile:
             group.attrs["format_id"] = self.format_id
             group.attrs["json"] = np.bytes_(metadata(nodes))
             texts = h5py.special_dtype(vlen=bytes)
-            file.create_dataset("videos_json", data=[json.dumps(self.video)] * self.videos, dtype=texts)
+            file.create_dataset("videos_json", data=[json.dumps(each) for each in self.videos], dtype=texts)
             file.create_dataset("tracks_json", data=[json.dumps([0, name]) for name in self.tracks], dtype=texts,
                                 shape=(len(self.tracks),))
             file.create_dataset("frames", data=np.array(self.frames, FRAME))
@@ -142,12 +143,38 @@ class ForeignLabels(Case):
         self.assertIn("img003.png", by_nose[50.0])
         self.assertIn("img001.png", by_nose[60.0])
 
+    def test_two_videos_have_folders_of_their_names(self):
+        walk, trot = ({"backend": {"filename": f"C:\\videos\\{name}.mp4"}} for name in ("walk", "trot"))
+        slp = SlpFile(video=[walk, trot])
+        slp.frame(0, [{"points": animal(20, 40)}], video=0)
+        slp.frame(3, [{"points": animal(30, 40)}], video=0)
+        slp.frame(0, [{"points": animal(40, 40)}], video=1)
+        slp.write(self.folder / "clips.slp")
+        for name, pictures in (("walk", "03"), ("trot", "0")):
+            for i in pictures:
+                path = self.folder / "frames" / name / f"f{i}.png"
+                path.parent.mkdir(exist_ok=True)
+                Image.open(self.folder / "frames" / f"img00{i}.png").rotate(180 if name == "trot" else 0).save(path)
+        samples = self.build("clips.slp")
+        self.assertEqual(sorted(samples), ["clip/train/trot/f0.png#0", "clip/train/walk/f0.png#0",
+                                           "clip/train/walk/f3.png#0"])
+        self.assert_points(samples["clip/train/walk/f3.png#0"], animal(30, 40))
+        self.assert_points(samples["clip/train/trot/f0.png#0"], animal(40, 40))
+
+    def test_frames_that_are_smaller_than_the_video(self):
+        slp = SlpFile(video={"backend": {"filename": "clip.mp4", "shape": [4, 240, 320, 1]}})
+        slp.frame(1, [{"points": animal(40, 80)}])
+        slp.write(self.folder / "clip.slp")
+        self.assertIn("size_mismatch", self.build("clip.slp", expect=1).stderr)
+        sample = self.build("clip.slp", resized="scale")["clip/train/img001.png#0"]
+        self.assert_points(sample, animal(40, 80) / 2)
+
     def test_what_a_slp_cannot_say_is_refused(self):
         several = SlpFile(videos=2)
         several.frame(0, [{"points": animal(20, 40)}], video=0)
         several.frame(0, [{"points": animal(20, 40)}], video=1)
         several.write(self.folder / "several.slp")
-        self.assertIn("labels of 2 videos", self.build("several.slp", expect=1).stderr)
+        self.assertIn("labels of the 2 videos clip", self.build("several.slp", expect=1).stderr)
         fewer = SlpFile()
         fewer.frame(0, [{"points": animal(20, 40)}])
         fewer.write(self.folder / "fewer.slp", nodes=NODES[:3])
@@ -231,7 +258,7 @@ class ForeignLabels(Case):
         self.assertIn("4 keypoint names", result.stderr)
         pixels = np.asarray(Image.open(sheet)).astype(int)
         # The animal's box with its margin fills the tile, so that the two eyes' discs are where they should be.
-        for colour, node in (((70, 150, 255), 1), ((255, 150, 30), 2)):
+        for colour, node in (((86, 180, 233), 1), ((240, 159, 0), 2)):
             x, y = animal(20, 40)[node]
             box = animal(20, 40)
             low, high = box.min(0), box.max(0)
@@ -239,6 +266,10 @@ class ForeignLabels(Case):
             left, top = (low + high) / 2 - side / 2
             column = int((x - left + 0.5) * 560 / side - 0.5)
             row = int((y - top + 0.5) * 560 / side - 0.5)
-            np.testing.assert_allclose(pixels[row, column], colour, atol=3)
+            np.testing.assert_allclose(pixels[row + 30, column + 6], colour, atol=3)  # beside legend and gap
         self.assertIn("--force", run("topology", "--from", self.folder / "clip.slp", "--out", out, expect=2).stderr)
-        run("topology", "--from", self.folder / "clip.slp", "--out", out, "--force")
+        said = run("topology", "--from", self.folder / "clip.slp", "--out", out, "--force").stderr
+        self.assertIn("--images frames --sheet sheet.png", said)  # the only folder of pictures beside the labels
+        self.assertIn("--images names the folder",
+                      run("topology", "--from", self.folder / "clip.slp", "--topology", out, "--sheet", sheet,
+                          expect=1).stderr)

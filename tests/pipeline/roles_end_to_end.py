@@ -183,8 +183,8 @@ class Roles(Case):
             return [[x + shift, y, v] for x, y, v in good["keypoint_2d"]]
 
         cases = [({}, ""), ({"img_path": "images/absent.png"}, "image_missing"),
-                 ({"img_path": "images/cut.png"}, "image_truncated"), ({"bbox": None}, "box_missing"),
-                 ({"bbox": [1, 1, 0, 0]}, "box_zero_size"), ({"pose": [0.0] * 105, "keypoint_2d": moved(2)}, "pose_missing"),
+                 ({"img_path": "images/cut.png"}, "image_truncated"), ({"bbox": 7}, "record_malformed"),
+                 ({"bbox": [1, 1, 0, 9]}, "box_zero_size"), ({"pose": [0.0] * 105, "keypoint_2d": moved(2)}, "pose_missing"),
                  ({"pose": None, "shape": None, "keypoint_3d": None, "keypoint_2d": moved(4)}, "pose_missing"),
                  ({"pose": [0.0] * 104}, "record_malformed")]
         write_annotations(data, [{**good, **changes} for changes, _ in cases])

@@ -287,7 +287,7 @@ INSTANTIATE_TEST_SUITE_P(
         Break{"img_path", "\"images\"", Reason::image_missing},
         Break{"mask_path", "7", Reason::record_malformed},
         Break{"mask_path", "\"../../mask.png\"", Reason::path_escapes_root},
-        Break{"bbox", "null", Reason::box_missing}, Break{"bbox", "[1,2,3]", Reason::record_malformed},
+        Break{"bbox", "[1,2,3]", Reason::record_malformed},
         Break{"bbox", "\"1 2 3 4\"", Reason::record_malformed},
         Break{"bbox", "[1,2,3,\"4\"]", Reason::record_malformed},
         Break{"bbox", "[1,2,3,true]", Reason::record_malformed},
@@ -429,6 +429,24 @@ INSTANTIATE_TEST_SUITE_P(Fields, BrokenKingdom,
                                            Break{"joints_vis",
                                                  "[0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0]",
                                                  Reason::no_visible_keypoints}));
+
+// Points lie in (10, 10)..(40, 30), and a box has a margin of a tenth of its longer side.
+TEST(Prima, a_box_that_nobody_drew_is_made_around_the_keypoints) {
+  const Folder folder;
+  for (const json& box : {json(), json(json::array()), json({0, 0, 0, 0}), json({8, 8, 0, 0})}) {
+    json record = prima_record();
+    record["bbox"] = box;
+    const Dataset dataset = folder.load_prima({record});
+    ASSERT_EQ(dataset.records[0].failure, Reason::none) << box << dataset.records[0].failure_detail;
+    EXPECT_NEAR(dataset.records[0].box.x_px, 7.0, 1e-9) << box;
+    EXPECT_NEAR(dataset.records[0].box.w_px, 36.0, 1e-9) << box;
+    EXPECT_THAT(joined(dataset.notes), ::testing::HasSubstr("no box: it was made around the keypoints"));
+  }
+  json nothing = prima_record();
+  nothing["bbox"] = nullptr;
+  for (json& row : nothing["keypoint_2d"]) row[2] = 0;
+  EXPECT_EQ(folder.load_prima({nothing}).records[0].failure, Reason::no_visible_keypoints);
+}
 
 }  // namespace
 }  // namespace q3d::loaders::formats

@@ -45,11 +45,16 @@ TEST(LabelCsv, names_line_and_cell_of_what_it_cannot_read) {
   EXPECT_THAT(refusal(kHeader + "a.png,1,2,3\n"), HasSubstr("line 4: got \"3\" in cell 4"));
   EXPECT_THAT(refusal(kHeader + "\"a.png,1,2\n"), HasSubstr("a quote that is not closed"));
   EXPECT_THAT(refusal("scorer,A,A\nbodyparts,snout,snout\ncoords,x,z\n"), HasSubstr("coords: got \"z\""));
+  EXPECT_THAT(refusal("scorer,A,A\nbodyparts,L\xf6hr,L\xf6hr\ncoords,x,y\n"), HasSubstr("CSV UTF-8"));
+  EXPECT_THAT(refusal(kHeader + "H\xfcndin.png,1,2\n"), HasSubstr("a name of a picture"));
 }
 
 TEST(LabelCsv, names_files_of_other_tools) {
   EXPECT_THAT(refusal("track,frame_idx,instance.score,nose.x\n,0,1,2\n"), HasSubstr("SLEAP's analysis CSV"));
   EXPECT_THAT(refusal("0 0.51 0.5 0.3 0.2 0.4 0.4 2\n"), HasSubstr("YOLO"));
+  EXPECT_THAT(refusal("{\"images\": []}\n"), HasSubstr("\"format\": \"coco\""));
+  EXPECT_THAT(refusal("Task: walk\nscorer: Ada\n"), HasSubstr("name the folder labeled-data"));
+  EXPECT_THAT(refusal("sep=;\nscorer;A\n"), HasSubstr("Excel's own first line"));
   EXPECT_THAT(refusal("version https://git-lfs.github.com/spec/v1\n"), HasSubstr("git lfs pull"));
 }
 
@@ -99,6 +104,28 @@ TEST(LabelCsv, utf16_of_a_spreadsheet) {
   const LabelTable table = read(wide);
   EXPECT_TRUE(table.rows_are_numbers);
   EXPECT_EQ(table.at(0, 0), 1.5);
+}
+
+// A row of the header that slipped by a cell gives every label to another keypoint.
+TEST(LabelCsv, a_row_of_the_header_that_slipped_is_refused) {
+  const std::string good = "scorer,A,A,A,A\nindividuals,i,i,i,i\nbodyparts,a,a,b,b\ncoords,x,y,x,y\n";
+  EXPECT_EQ(refusal(good + "a.png,1,2,3,4\n"), "");
+  for (const char* header : {"scorer,A,A,A,A\nindividuals,i,i,i,i\nbodyparts,b,a,a,b\ncoords,x,y,x,y\n",
+                             "scorer,A,A,A,A\nindividuals,i,i,i,i\nbodyparts,a,a,b,b\ncoords,y,x,y,x\n",
+                             "scorer,A,A,A,A\nindividuals,i,i,i,j\nbodyparts,a,a,b,b\ncoords,x,y,x,y\n"}) {
+    EXPECT_THAT(refusal(std::string(header) + "a.png,1,2,3,4\n"), HasSubstr("slipped against the others"));
+  }
+  EXPECT_EQ(refusal("scorer,A,A,A\nbodyparts,a,a,a\ncoords,likelihood,x,y\na.png,1,2,3\n"), "")
+      << "pandas sorted the columns";
+}
+
+TEST(LabelCsv, the_name_of_the_index_is_no_row) {
+  const LabelTable table = read(kHeader + "frame,,\n0,1,2\n1,3,4\n");
+  EXPECT_THAT(table.rows, ElementsAre("0", "1"));
+  EXPECT_TRUE(table.rows_are_numbers);
+  EXPECT_EQ(table.at(1, 1), 4.0);
+  EXPECT_THAT(read(kHeader + "a.png,,\nb.png,1,2\n").rows, ElementsAre("a.png", "b.png"));
+  EXPECT_THAT(read(kHeader + "frame,,\n").rows, ::testing::IsEmpty());
 }
 
 }  // namespace

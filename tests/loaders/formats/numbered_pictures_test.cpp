@@ -46,6 +46,15 @@ TEST_F(Numbered, no_doubt_about_single_frames_of_a_video) {
   EXPECT_EQ(with(40, 3).doubt(rows(0, 100)), "");
 }
 
+TEST_F(Numbered, fewer_pictures_than_frames_may_be_every_nth) {
+  EXPECT_TRUE(with(0, 3).may_be_every_nth(rows(0, 100)));
+  EXPECT_FALSE(with(0, 4).may_be_every_nth(rows(0, 4)));
+  EXPECT_FALSE(with(0, 9).may_be_every_nth(rows(0, 4)));
+  EXPECT_FALSE(with(12, 3).may_be_every_nth(rows(0, 100)));
+  EXPECT_FALSE(with(0, 3, 20).may_be_every_nth(rows(0, 100))) << "the frames' own numbers";
+  EXPECT_FALSE(with(0, 1).may_be_every_nth(rows(0, 100)));
+}
+
 TEST_F(Numbered, doubt_where_counts_are_shifted) {
   EXPECT_THAT(with(1, 4).doubt(rows(0, 4)),
               HasSubstr("4 frames numbered 0 to 3 and 4 pictures numbered 1 to 4"));

@@ -57,6 +57,12 @@ TEST(PictureName, percent_codes) {
   EXPECT_THAT(readings("a%4"), ElementsAre("a%4"));
 }
 
+TEST(PictureName, spaces_around_a_name) {
+  EXPECT_THAT(readings(" sub/a.jpg\r\n"), ElementsAre(" sub/a.jpg\r\n", "sub/a.jpg"));
+  EXPECT_THAT(readings("D:\\set\\a.jpg "), Contains("/set/a.jpg"));
+  EXPECT_THAT(readings(" "), ElementsAre(" "));
+}
+
 TEST(PictureName, in_a_sample_id) {
   EXPECT_EQ(id_part("images/./a.jpg"), "images/a.jpg");
   EXPECT_EQ(id_part("images\\a.jpg"), "images/a.jpg");

@@ -69,13 +69,27 @@ TEST(StanfordExtra, the_first_release_lacks_the_last_four) {
 
 TEST(StanfordExtra, a_bad_record_fails_alone_and_another_file_is_refused) {
   const Folder folder;
-  json no_box = dog(24);
-  no_box.erase("img_bbox");
-  const Dataset dataset = folder.load({dog(23), no_box, dog(24)});
+  json no_area = dog(24);
+  no_area["img_bbox"] = {5, 6, 0, 40};
+  const Dataset dataset = folder.load({dog(23), no_area, dog(24)});
   EXPECT_EQ(dataset.records[0].failure, Reason::keypoints_wrong_length);
-  EXPECT_EQ(dataset.records[1].failure, Reason::box_missing);
+  EXPECT_EQ(dataset.records[1].failure, Reason::box_zero_size);
   EXPECT_EQ(dataset.records[2].failure, Reason::none);
   EXPECT_THROW(folder.load(json::object()), std::runtime_error);
+}
+
+// Joints lie on the diagonal from (10, 20) to (33, 43), and a box has a margin of a tenth of its longer side.
+TEST(StanfordExtra, a_box_that_nobody_drew_is_made) {
+  const Folder folder;
+  for (const json& box :
+       {json(), json(json::array()), json({0, 0, 0, 0}), json({-1, -1, -1, -1}), json("")}) {
+    json record = dog(24);
+    record["img_bbox"] = box;
+    const manifests::SampleRecord sample = folder.load(json::array({record})).records[0];
+    ASSERT_EQ(sample.failure, Reason::none) << box << sample.failure_detail;
+    EXPECT_NEAR(sample.box.x_px, 10.0 - 2.3, 1e-9) << box;
+    EXPECT_NEAR(sample.box.h_px, 23.0 + 4.6, 1e-9) << box;
+  }
 }
 
 }  // namespace

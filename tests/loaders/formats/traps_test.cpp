@@ -158,7 +158,7 @@ TEST(Traps, trap_08_a_measured_pseudo_label_box) {
 TEST(Traps, trap_08_zero_sized_boxes_fail) {
   const Folder folder;
   json record = prima_record();
-  record["bbox"] = {20, 20, 0, 0};
+  record["bbox"] = {20, 20, 0, 15};
   EXPECT_EQ(folder.load_prima({record}).records[0].failure, Reason::box_zero_size);
 }
 
