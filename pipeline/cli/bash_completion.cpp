@@ -9,7 +9,7 @@ namespace {
 constexpr const char* kBeginning =
     R"(# bash completion of quadruped3d; `quadruped3d completion bash` makes this file.
 _quadruped3d() {
-  local cur=${COMP_WORDS[COMP_CWORD]} prev= command= words= options= value= i
+  local cur=${COMP_WORDS[COMP_CWORD]} prev= command= words= options= value= rest= i
   ((COMP_CWORD > 0)) && prev=${COMP_WORDS[COMP_CWORD - 1]}
   # bash parts "--option=value" at the sign.
   if [[ $cur == "=" ]]; then
@@ -24,21 +24,20 @@ _quadruped3d() {
 
 constexpr const char* kEnd = R"(  esac
   COMPREPLY=()
+  # Where no option waits for its value, it is a command, an option, or what the command itself takes.
+  if [[ -z $value ]]; then
+    if [[ $cur == -* ]]; then
+      value=words words=$options
+    elif [[ -n $words ]]; then
+      value=words
+    else
+      value=$rest
+    fi
+  fi
   case $value in
     words) mapfile -t COMPREPLY < <(compgen -W "$words" -- "$cur") ;;
     file) mapfile -t COMPREPLY < <(compgen -f -- "$cur") ;;
     folder) mapfile -t COMPREPLY < <(compgen -d -- "$cur") ;;
-    other) ;;
-    *)
-      if [[ $cur == -* ]]; then
-        mapfile -t COMPREPLY < <(compgen -W "$options" -- "$cur")
-      elif [[ -n $words ]]; then
-        mapfile -t COMPREPLY < <(compgen -W "$words" -- "$cur")
-      else
-        value=file
-        mapfile -t COMPREPLY < <(compgen -f -- "$cur")
-      fi
-      ;;
   esac
   # Outside of a completion there is nothing to set.
   [[ $value == file || $value == folder ]] && compopt -o filenames 2>/dev/null
@@ -68,17 +67,35 @@ std::string names_of_commands(const CommandNode& node) {
   return text;
 }
 
+// What the script calls a kind of value.
+std::string name_of(ValueKind value) {
+  switch (value) {
+    case ValueKind::file:
+      return "file";
+    case ValueKind::folder:
+      return "folder";
+    case ValueKind::word:
+      return "words";
+    case ValueKind::none:
+    case ValueKind::other:
+      break;
+  }
+  return "other";
+}
+
 // The words that may stand where no option's value is expected.
 std::string command_cases(const CommandNode& root, const std::vector<const CommandNode*>& nodes) {
   std::string text = "  case $command in\n";
   for (const CommandNode* node : nodes) {
     std::string words = names_of_commands(*node);
     if (node == &root) words += " help";
+    std::string rest;
     for (const OptionInfo& positional : node->positionals) {
       for (const std::string& word : positional.words) words += (words.empty() ? "" : " ") + word;
+      if (rest.empty()) rest = name_of(positional.value);
     }
-    text += fmt::format("    \"{}\") words=\"{}\" options=\"{}\" ;;\n", path_of(*node), words,
-                        names_of_options(*node));
+    text += fmt::format("    \"{}\") words=\"{}\" options=\"{}\" rest={} ;;\n", path_of(*node), words,
+                        names_of_options(*node), rest);
   }
   return text + fmt::format("    help) words=\"{}\" ;;\n  esac\n", names_of_commands(root));
 }
@@ -93,10 +110,7 @@ std::string value_cases(const std::vector<const CommandNode*>& nodes) {
       for (const std::string& name : option.names) {
         patterns += fmt::format("{}\"{} {}\"", patterns.empty() ? "" : " | ", path_of(*node), name);
       }
-      std::string value = option.value == ValueKind::file     ? "file"
-                          : option.value == ValueKind::folder ? "folder"
-                          : option.value == ValueKind::word   ? "words"
-                                                              : "other";
+      std::string value = name_of(option.value);
       if (option.value == ValueKind::word)
         value += fmt::format(" words=\"{}\"", fmt::join(option.words, " "));
       text += fmt::format("    {}) value={} ;;\n", patterns, value);

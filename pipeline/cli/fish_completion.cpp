@@ -9,7 +9,7 @@ namespace q3d::pipeline::cli {
 namespace {
 
 // In single quotes of fish.
-std::string quoted(const std::string& text) {
+std::string in_quotes(const std::string& text) {
   std::string result = "'";
   for (const char sign : text) {
     if (sign == '\'' || sign == '\\') result += '\\';
@@ -35,7 +35,7 @@ std::string condition(const CommandNode& node) {
 }
 
 std::string option_line(const CommandNode& node, const OptionInfo& option) {
-  std::string text = "complete -c quadruped3d -n " + quoted(condition(node));
+  std::string text = "complete -c quadruped3d -n " + in_quotes(condition(node));
   for (const std::string& name : option.names) {
     const bool is_long = name.rfind("--", 0) == 0;
     text += is_long ? " -l " + name.substr(2) : " -s " + name.substr(1);
@@ -56,11 +56,11 @@ std::string option_line(const CommandNode& node, const OptionInfo& option) {
       text += " -x";
       break;
   }
-  return text + " -d " + quoted(option.description) + "\n";
+  return text + " -d " + in_quotes(option.description) + "\n";
 }
 
 std::string positional_line(const CommandNode& node, const OptionInfo& positional) {
-  const std::string beginning = "complete -c quadruped3d -n " + quoted(condition(node));
+  const std::string beginning = "complete -c quadruped3d -n " + in_quotes(condition(node));
   if (positional.value == ValueKind::word) {
     return beginning + fmt::format(" -a '{}'\n", fmt::join(positional.words, " "));
   }
@@ -74,8 +74,8 @@ std::string lines_of(const CommandNode& node) {
     where += fmt::format("; and not __fish_seen_subcommand_from {}", names_of(node.commands));
   }
   for (const CommandNode& command : node.commands) {
-    text += fmt::format("complete -c quadruped3d -n {} -a {} -d {}\n", quoted(where), command.name(),
-                        quoted(command.description));
+    text += fmt::format("complete -c quadruped3d -n {} -a {} -d {}\n", in_quotes(where), command.name(),
+                        in_quotes(command.description));
   }
   for (const OptionInfo& option : node.options) text += option_line(node, option);
   for (const OptionInfo& positional : node.positionals) text += positional_line(node, positional);

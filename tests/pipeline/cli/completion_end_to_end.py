@@ -18,7 +18,7 @@ def commands():
 
 def options_of(*words):
     """The long options that the help of a command lists."""
-    return set(re.findall(r"^  (?:-\w,)?(--[a-z-]+)", run(*words, "--help").stdout, re.MULTILINE))
+    return set(re.findall(r"^  (?:-\w,)?(--[a-z0-9-]+)", run(*words, "--help").stdout, re.MULTILINE))
 
 
 class Completion(Case):
@@ -107,7 +107,7 @@ class ManualPage(Case):
         sections = dict(re.findall(r"^\.SS ([a-z -]+)\n(.*?)(?=^\.S[SH] )", text, re.MULTILINE | re.DOTALL))
         for command in commands():
             self.assertIn(command, sections)
-            entries = set(re.findall(r"--[a-z-]+", " ".join(re.findall(r"^\.TP\n\.B (.*)$", sections[command],
+            entries = set(re.findall(r"--[a-z0-9-]+", " ".join(re.findall(r"^\.TP\n\.B (.*)$", sections[command],
                                                                        re.MULTILINE))))
             self.assertEqual(entries, options_of(command), command)
         self.assertIn("config show", sections)

@@ -5,8 +5,8 @@ import json
 import shlex
 import shutil
 
-from e2e import (PICTURES, UNIT, Case, Fault, Scene, digests, flip_bit, latest, run, run_json, started, units_in_journals,
-                 verdicts)
+from e2e import (PICTURES, UNIT, Case, Fault, Scene, digests, flip_bit, latest, run, run_json, started,
+                 units_in_journals, verdicts)
 
 UNITS = PICTURES // UNIT
 FOLDERS = ("predict", "refine", "measure", "crops", "shards")
@@ -286,7 +286,8 @@ class DryRun(Case):
         self.assertEqual(stages["predict"]["units_reused"], UNITS)
         self.assertEqual(stages["crops"]["units_made"] + stages["crops"]["units_reused"], UNITS)
         why, = stages["refine"]["why"]
-        self.assertTrue(why.startswith(f"its key differs from that of {latest(self.shared / 'out').name}: tau_low: "), why)
+        before = latest(self.shared / "out").name
+        self.assertTrue(why.startswith(f"its key differs from that of {before}: tau_low: "), why)
         self.assertIn(f" -> {low / 2}"[:12], why)
         self.assertIn("the stage refine before it is another", stages["measure"]["why"][0])
         self.assert_as_forecast(stages, self.made_by_a_build("--set", f"filter.tau_low={low / 2}"))
