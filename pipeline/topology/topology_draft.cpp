@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <cctype>
+#include <map>
 #include <nlohmann/json.hpp>
-#include <set>
 #include <stdexcept>
 #include <system_error>
 
@@ -45,19 +45,20 @@ bool is_picture(const fs::path& file) {
   return ending == ".jpg" || ending == ".jpeg" || ending == ".png";
 }
 
-// Returns the only folder below the labels' folder that holds pictures itself, relative to the latter; empty
-// if there are several, or if the labels' folder holds some too.
-fs::path only_folder_of_pictures(const fs::path& labels) {
+// Returns the folder at or below the labels' folder that holds the most pictures itself, relative to the
+// latter; empty if that is the labels' folder.
+fs::path folder_of_most_pictures(const fs::path& labels) {
   const fs::path top = folder_of(labels);
-  std::set<fs::path> folders;
+  std::map<fs::path, std::size_t> counts;
   std::error_code error;
   const auto options = fs::directory_options::skip_permission_denied;
   for (fs::recursive_directory_iterator it(top, options, error), end; !error && it != end;
        it.increment(error)) {
-    if (is_picture(it->path())) folders.insert(it->path().parent_path().lexically_relative(top));
-    if (folders.size() > 1) return {};
+    if (is_picture(it->path())) ++counts[it->path().parent_path().lexically_relative(top)];
   }
-  return folders.empty() || *folders.begin() == "." ? fs::path() : *folders.begin();
+  const auto most = std::max_element(counts.begin(), counts.end(),
+                                     [](const auto& a, const auto& b) { return a.second < b.second; });
+  return most == counts.end() || most->first == "." ? fs::path() : most->first;
 }
 
 }  // namespace
@@ -71,7 +72,7 @@ Draft draft_topology(const DraftOptions& options) {
   }
   Draft draft{loaders::formats::survey_labels(options.from), {}, {}};
   // A project of DeepLabCut has its pictures where its labels say.
-  if (!fs::is_directory(options.from)) draft.images = only_folder_of_pictures(options.from);
+  if (!fs::is_directory(options.from)) draft.images = folder_of_most_pictures(options.from);
   const std::string name = options.name.empty() ? draft.survey.file.stem().string() : options.name;
   draft.guess = loaders::keypoints::guess_topology(name, draft.survey.names);
   const std::string about = fmt::format(

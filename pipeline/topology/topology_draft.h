@@ -22,8 +22,8 @@ struct Draft {
   loaders::formats::LabelSurvey survey;
   loaders::keypoints::TopologyGuess guess;
   std::string text;  // the topology file
-  std::filesystem::path
-      images{};  // the one folder of pictures below the labels' folder; empty: none, or several
+  // The folder below the labels' folder that holds most pictures; empty if the labels' folder itself does.
+  std::filesystem::path images{};
 };
 
 // Reads the names of the keypoints, guesses a topology and writes it. Throws ConfigError if the file to write
