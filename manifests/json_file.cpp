@@ -64,11 +64,6 @@ bool is_yaml(std::string_view line) {
 // Says what the text is that JSON's parser gave up on, if it is known; else "".
 std::string hint(std::string_view text, std::string_view reason) {
   if (reason.find("UTF-8") != std::string_view::npos) return " (save the file with the encoding UTF-8)";
-  if (reason.find("expected end of input") != std::string_view::npos) {
-    return " (more text follows the first JSON value; if there is one on each line, as in JSON Lines, put "
-           "them "
-           "into one file of the expected form)";
-  }
   const std::string_view line = text.substr(0, text.find_first_of("\r\n"));
   if (line.starts_with("scorer,") || line.starts_with("scorer;") || line.starts_with("scorer\t")) {
     return " (this is a table as DeepLabCut and Lightning Pose write it: use \"format\": \"deeplabcut\")";
@@ -83,6 +78,10 @@ std::string hint(std::string_view text, std::string_view reason) {
   const bool is_numbers = line.find_first_not_of("0123456789.-+eE \t") == std::string_view::npos;
   if (is_numbers && std::count(line.begin(), line.end(), ' ') >= 4) {
     return " (these are lines of numbers, as YOLO writes them: export the labels as COCO Keypoints instead)";
+  }
+  if (reason.find("expected end of input") != std::string_view::npos) {
+    return " (more text follows the first JSON value; if there is one on each line, as in JSON Lines, put "
+           "them into one file of the expected form)";
   }
   return {};
 }

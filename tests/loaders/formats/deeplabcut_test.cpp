@@ -159,7 +159,8 @@ TEST(DeepLabCut, a_folder_gives_all_labels_of_the_project) {
   EXPECT_EQ(dataset.records[0].id, "lab/train/labeled-data/run/img1.png#0");
   EXPECT_EQ(dataset.records[0].failure, Reason::none) << dataset.records[0].failure_detail;
   EXPECT_EQ(dataset.records[0].keypoints[kNose].x_px, 3.0);
-  EXPECT_EQ(dataset.files.size(), 3U) << "two files of labels and the topology";
+  EXPECT_EQ(dataset.files.size(), 4U)
+      << "two files of labels, the .csv that one of them is compared with, and the topology";
   project.options.annotations = "frames";
   EXPECT_THROW(load_dataset(project.options), std::runtime_error);
 }
