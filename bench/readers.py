@@ -23,7 +23,7 @@ import statistics
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 
 import numpy as np
 
@@ -65,7 +65,7 @@ def unpacked(name: str, crop: bytes, numbers: np.ndarray, decode: bool) -> Sampl
     return name, picture, numbers[6:].astype(np.float32)
 
 
-def of_dataset(dataset: quadruped3d.Dataset, decode: bool, seed: int) -> Iterator[Sample]:
+def of_dataset(dataset: quadruped3d.Dataset, decode: bool, seed: int) -> Generator[Sample, None, None]:
     order = np.random.default_rng(seed)
     while True:
         for number in order.permutation(len(dataset)).tolist():
@@ -79,7 +79,7 @@ def of_dataset(dataset: quadruped3d.Dataset, decode: bool, seed: int) -> Iterato
                 yield dataset.id(number), None, np.concatenate([shard.read(name, row, 1).ravel() for name in columns])
 
 
-def of_webdataset(folder: pathlib.Path, decode: bool, seed: int) -> Iterator[Sample]:
+def of_webdataset(folder: pathlib.Path, decode: bool, seed: int) -> Generator[Sample, None, None]:
     urls = [str(path) for path in sorted(folder.glob("*.tar"))]
     epoch = 0
     while True:
@@ -89,11 +89,15 @@ def of_webdataset(folder: pathlib.Path, decode: bool, seed: int) -> Iterator[Sam
             yield sample["id"].decode(), *unpacked("", sample["crop"], numbers, decode)[1:]
 
 
-def of_mds(folder: pathlib.Path, decode: bool, seed: int) -> Iterator[Sample]:
+def of_mds(folder: pathlib.Path, decode: bool, seed: int) -> Generator[Sample, None, None]:
     dataset = streaming.StreamingDataset(local=str(folder), shuffle=True, shuffle_seed=seed, batch_size=1)
-    while True:
-        for sample in dataset:
-            yield unpacked(sample["id"], sample["crop"], sample["labels"], decode)
+    try:
+        while True:
+            for sample in dataset:
+                yield unpacked(sample["id"], sample["crop"], sample["labels"], decode)
+    finally:
+        if dataset._iterator:  # its threads read ahead, in a folder that is removed at the end
+            dataset._iterator.exit()
 
 
 def write_webdataset(dataset: quadruped3d.Dataset, folder: pathlib.Path) -> None:
@@ -112,7 +116,7 @@ def write_mds(dataset: quadruped3d.Dataset, folder: pathlib.Path) -> None:
             writer.write({"id": name, "crop": crop, "labels": numbers})
 
 
-def check_that_they_agree(dataset: quadruped3d.Dataset, readers: dict[str, Callable[..., Iterator[Sample]]]) -> None:
+def check_that_they_agree(dataset: quadruped3d.Dataset, readers: dict[str, Callable[..., Generator[Sample, None, None]]]) -> None:
     """Raises AssertionError unless every reader gives the samples of the dataset."""
     expected = {sample["id"]: sample for sample in dataset}
     for name, reader in readers.items():
@@ -122,15 +126,17 @@ def check_that_they_agree(dataset: quadruped3d.Dataset, readers: dict[str, Calla
             wanted = np.concatenate([np.ravel(expected[found][label]) for label in LABELS])
             np.testing.assert_array_equal(picture, expected[found]["image"], err_msg=f"{name}: {found}")
             np.testing.assert_allclose(labels, wanted, atol=1e-6, err_msg=f"{name}: {found}")
+        source.close()
 
 
-def rate(source: Iterator[Sample], seconds: float) -> float:
-    """Samples a second, after the first, which opens files."""
+def rate(source: Generator[Sample, None, None], seconds: float) -> float:
+    """Samples a second, after the first, which opens files. Closes the source."""
     next(source)
     start, count = time.perf_counter(), 0
     while (elapsed := time.perf_counter() - start) < seconds:
         next(source)
         count += 1
+    source.close()
     return count / elapsed
 
 
@@ -145,7 +151,7 @@ def main() -> int:
         tars, mds = pathlib.Path(home, "tars"), pathlib.Path(home, "mds")
         write_webdataset(dataset, tars)
         write_mds(dataset, mds)
-        readers: dict[str, Callable[..., Iterator[Sample]]] = {
+        readers: dict[str, Callable[..., Generator[Sample, None, None]]] = {
             "quadruped3d.Dataset": lambda decode, seed: of_dataset(dataset, decode, seed),
             "WebDataset": lambda decode, seed: of_webdataset(tars, decode, seed),
             "MDS": lambda decode, seed: of_mds(mds, decode, seed),

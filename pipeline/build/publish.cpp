@@ -75,7 +75,7 @@ void warn_of_formulas(const candidates::Ingest& ingest, const std::vector<manife
 
 struct ListedFile {
   fs::path path;
-  std::string expected;            // SHA-256
+  std::string expected;              // SHA-256
   std::optional<std::string> got{};  // of the bytes; nothing if there is no such file
 };
 

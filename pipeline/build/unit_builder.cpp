@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "filters/guards.h"
 #include "pipeline/build/measuring_models.h"
 #include "pipeline/dataset/dataset_manifest.h"
 #include "pipeline/unit/decode.h"
@@ -31,12 +32,13 @@ UnitBuilder::UnitBuilder(const config::BuildConfig& config, const config::Judgin
       shards_(workspace.out(), "shards", keys.shards, &candidates::Unit::label_digest),
       terms_(dataset::terms_of_datasets(config)),
       judgements_(workspace.ingest().candidates.size()),
-      progress_(rules,
-                {.judges = makes(Stage::fidelity),
-                 .refines = makes(Stage::refine),
-                 .measures = makes(Stage::measure)},
-                static_cast<std::int64_t>(workspace.ingest().candidates.size()),
-                static_cast<std::int64_t>(workspace.ingest().units.size()), workspace.quiet()) {
+      progress_(
+          rules,
+          {.judges = makes(Stage::fidelity),
+           .refines = makes(Stage::refine),
+           .measures = makes(Stage::measure) && (filters::is_any_on(rules.guards) || rules.min_trust > 0.0)},
+          static_cast<std::int64_t>(workspace.ingest().candidates.size()),
+          static_cast<std::int64_t>(workspace.ingest().units.size()), workspace.quiet()) {
   // Measurements go by the labels' digest, because a vetoed candidate is not measured. Without pseudo labels
   // there is no key.
   if (!keys.measure.empty() && makes(Stage::measure)) {

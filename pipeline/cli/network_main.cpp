@@ -10,7 +10,8 @@
 int main(int argc, char** argv) {
   namespace cli = q3d::pipeline::cli;
   if (!cli::waiting_is_decided()) return cli::start_again_passively(argv);
-  // `verify` and `inspect` come before the plain commands of these names, which do not repair and draw no sheets.
+  // `verify` and `inspect` come before the plain commands of these names, which do not repair and draw no
+  // sheets.
   std::vector<cli::CommandEntry> entries{
       {"build", cli::add_build},
       {"calibrate", cli::add_calibrate},

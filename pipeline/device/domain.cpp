@@ -76,11 +76,6 @@ std::optional<double> quantile(const NetworkDomain& domain, double share) {
   return std::nullopt;
 }
 
-const std::vector<double>& measured_shares() {
-  static const std::vector<double> kShares{0.05, 0.25, 0.5, 0.75, 0.95};
-  return kShares;
-}
-
 std::vector<ErrorQuantile> quantiles_of(std::vector<double> errors, const std::vector<double>& shares) {
   if (errors.empty()) throw std::invalid_argument("quantiles_of: got no errors");
   for (const double error : errors) {

@@ -1,6 +1,6 @@
 // The domain of a checkpoint describes the pictures that its network knows. It stands in the file's metadata
-// under kDomainKey. tools/describe_checkpoint.py writes it from an evaluation; tools/import_assets.py writes what the
-// paper states.
+// under kDomainKey. tools/describe_checkpoint.py writes it from an evaluation; tools/import_assets.py writes
+// what the paper states.
 #pragma once
 
 #include <cstdint>
@@ -40,9 +40,6 @@ NetworkDomain domain_from_json(const std::string& text);
 
 // The quantile of exactly this share, if it was measured.
 std::optional<double> quantile(const NetworkDomain& domain, double share);
-
-// The shares that tools/describe_checkpoint.py measures: 0.05, 0.25, 0.5, 0.75, 0.95.
-const std::vector<double>& measured_shares();
 
 // Measures quantiles of some errors, linearly interpolated, as numpy does. Throws std::invalid_argument
 // without errors and for errors that are not finite.

@@ -27,8 +27,8 @@ inline constexpr std::uintmax_t kSmallCheckpointBytes = std::uintmax_t{64} << 20
 int compute_threads(const config::NetworkConfig& network);
 
 // Names what of device, threads and LibTorch decides the result's bits: "cpu-2, intel avx512, kernels AVX512,
-// LibTorch 2.11.0" or "cuda, NVIDIA H200, LibTorch 2.11.0". It is part of the stage keys. Loads nothing. Throws as
-// load_network does.
+// LibTorch 2.11.0" or "cuda, NVIDIA H200, LibTorch 2.11.0". It is part of the stage keys. Loads nothing.
+// Throws as load_network does.
 std::string device_key(const config::NetworkConfig& network);
 
 // Returns what the checkpoint says of the pictures that its network knows, or `unknown` if it says nothing.

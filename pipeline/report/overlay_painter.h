@@ -70,8 +70,8 @@ class OverlayPainter {
   MeshPainter painter_;
 };
 
-// Draws what the colours in these panels mean, in one strip of this width. The strip has no rows where they need
-// no explanation.
+// Draws what the colours in these panels mean, in one strip of this width. The strip has no rows where they
+// need no explanation.
 cv::Mat overlay_legend(std::span<const Panel> panels, int width_px);
 
 // The pictures below each other or in `columns` columns, on paper, each as wide as the widest, and the legend

@@ -15,8 +15,8 @@ struct ProgressState {
   std::int64_t total = 0;
   double per_second = 0.0;  // 0 = not known yet
   double elapsed_s = 0.0;
-  std::string details;   // what else there is to tell; may be empty
-  bool is_last = false;  // the elapsed time is told instead of the time left
+  std::string details{};  // what else there is to tell; may be empty
+  bool is_last = false;   // the elapsed time is told instead of the time left
 };
 
 // A line for files and pipes: "candidates: 12 / 96 (12 %), 3.4/s, 24 s left; DETAILS".

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <optional>
 
-#include "manifests/atomic_file.h"
 #include "manifests/digest.h"
 #include "manifests/file_descriptor.h"
 #include "manifests/journal.h"
@@ -41,7 +40,7 @@ void check_manifest(const fs::path& folder, StageCheck& check) {
   const fs::path file = folder / "manifest.json";
   const std::string name = folder.filename().string();
   const std::string short_key = name.substr(name.rfind('-') + 1);
-  const auto key = fs::exists(file) ? key_in_manifest(manifests::read_file(file)) : std::nullopt;
+  const auto key = fs::exists(file) ? key_in_manifest(file) : std::nullopt;
   if (key && key->starts_with(short_key)) return;
   check.problems.push_back({file,
                             fmt::format("got {}, expected a key that starts with {}",

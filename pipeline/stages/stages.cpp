@@ -12,6 +12,7 @@
 
 #include "filters/trust.h"
 #include "manifests/atomic_file.h"
+#include "manifests/sealed_json.h"
 #include "manifests/shard.h"
 #include "pipeline/config/build_settings.h"
 #include "pipeline/run/log.h"
@@ -206,13 +207,17 @@ std::map<std::string, std::string> made_from(const config::BuildConfig& config,
   return recipes_of_build(config, rules, ingest, assets, device_key).texts;
 }
 
-std::optional<std::string> key_in_manifest(const std::string& text) {
-  const json manifest = json::parse(text, nullptr, false);
-  const auto found = manifest.is_object() ? manifest.find("key") : manifest.end();
-  if (found == manifest.end() || !found->is_string()) return std::nullopt;
-  std::string key = found->get<std::string>();
-  const bool is_key = key.size() == 64 && key.find_first_not_of("0123456789abcdef") == std::string::npos;
-  return is_key ? std::optional(std::move(key)) : std::nullopt;
+std::optional<std::string> key_in_manifest(const std::filesystem::path& file) {
+  try {
+    const nlohmann::ordered_json manifest = manifests::read_sealed_json(file).document;
+    const auto found = manifest.find("key");
+    if (found == manifest.end() || !found->is_string()) return std::nullopt;
+    std::string key = found->get<std::string>();
+    const bool is_key = key.size() == 64 && key.find_first_not_of("0123456789abcdef") == std::string::npos;
+    return is_key ? std::optional(std::move(key)) : std::nullopt;
+  } catch (const manifests::DamagedDocument&) {
+    return std::nullopt;
+  }
 }
 
 std::filesystem::path stage_folder(const std::filesystem::path& out, const std::string& stage,
@@ -226,7 +231,7 @@ void open_stage_folder(const std::filesystem::path& folder, const std::string& s
   manifests::remove_temporaries(folder);
   const std::filesystem::path manifest = folder / "manifest.json";
   if (std::filesystem::exists(manifest)) {
-    const std::optional<std::string> found = key_in_manifest(manifests::read_file(manifest));
+    const std::optional<std::string> found = key_in_manifest(manifest);
     if (found == key) return;
     if (found || folder.filename() != folder_name(stage, key)) {
       throw std::runtime_error(
@@ -236,7 +241,7 @@ void open_stage_folder(const std::filesystem::path& folder, const std::string& s
     run::log_warning(fmt::format("{}: damaged: got no readable key, expected {}; it is written anew",
                                  manifest.string(), key));
   }
-  manifests::write_file_atomically(manifest, json{{"stage", stage}, {"key", key}}.dump(2) + "\n");
+  manifests::write_file_atomically(manifest, manifests::seal_json({{"stage", stage}, {"key", key}}));
   // The names of the folders that were made, up to the one that the user gave.
   manifests::sync_folder(folder.parent_path());
   manifests::sync_folder(folder.parent_path().parent_path());

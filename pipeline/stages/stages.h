@@ -57,8 +57,9 @@ StageKeys stage_keys(const config::BuildConfig& config, const config::JudgingRul
 // <out>/stages/<stage>-<first 12 of key>.
 std::filesystem::path stage_folder(const std::filesystem::path& out, const std::string& stage,
                                    const std::string& key);
-// The key that the text of a stage's manifest.json holds; nothing when it is damaged so that it holds none.
-std::optional<std::string> key_in_manifest(const std::string& text);
+// The key that a stage's manifest.json holds; nothing when it differs from the digest at its end, or holds
+// none. A manifest of an earlier version has no digest. Throws manifests::IoError.
+std::optional<std::string> key_in_manifest(const std::filesystem::path& file);
 // Makes the folder, removes torn temporaries and writes manifest.json (stage and key). A manifest.json
 // without a readable key is damaged: it is written anew if the folder has the name that stage_folder gives,
 // and a warning says so. Throws std::runtime_error when the folder belongs to another key.

@@ -104,6 +104,11 @@ TEST_F(Repair, BooksJournalsAndManifestsAreMadeAgain) {
   write(stage("out", "refine") / "manifest.json", "{\"stage\": ");
   EXPECT_THAT(mend().unrepaired, IsEmpty());
   expect_as_before();
+  flip_bit(stage("out", "crops") / "manifest.json",
+           60);  // in the part of the key that the folder's name lacks
+  EXPECT_THAT(dataset::verify(first_.folder, true, true).problems, Contains(HasSubstr("no readable key")));
+  EXPECT_THAT(mend().unrepaired, IsEmpty());
+  expect_as_before();
 }
 
 TEST_F(Repair, TellsWhatItCannotRepair) {

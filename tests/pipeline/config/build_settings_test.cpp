@@ -33,7 +33,8 @@ TEST(Settings, DefaultsAndOtherValuesRoundTrip) {
   expect_round_trip(network_settings(), NetworkConfig{});
   expect_round_trip(network_settings(), NetworkConfig{"c", "s", "cpu", Dtype::bfloat16, 3, 2});
   expect_round_trip(tta_settings(), TtaConfig{});
-  expect_round_trip(tta_settings(), TtaConfig{TtaObjective::demo, 0.25, 1.0, 2.0, 0.01, 0.02, 3, 4, 0.5, true, 5});
+  expect_round_trip(tta_settings(),
+                    TtaConfig{TtaObjective::demo, 0.25, 1.0, 2.0, 0.01, 0.02, 3, 4, 0.5, true, 5});
   expect_round_trip(shard_settings(), ShardConfig{8, manifests::ImageEncoding::reference, 1, 4.0, 256});
   GuardConfig guards;
   guards.visible_min = 26;
