@@ -43,8 +43,8 @@ void require_id_part(const std::string& part, const char* option) {
   const bool is_usable = !part.empty() && part.find_first_of("/#\\") == std::string::npos &&
                          std::none_of(part.begin(), part.end(), [](unsigned char c) { return c < 0x20; });
   if (!is_usable) {
-    throw std::invalid_argument(
-        fmt::format("dataset {}: got \"{}\", expected a text without /, \\ and #", option, part));
+    throw std::invalid_argument(fmt::format(
+        "dataset {}: got \"{}\", expected a text without /, \\, # and control characters", option, part));
   }
 }
 

@@ -10,6 +10,7 @@
 #include <new>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -144,6 +145,10 @@ int run_program(int argc, char** argv, std::span<const CommandEntry> entries) {
   } catch (const std::bad_alloc&) {
     fmt::print(stderr,
                "quadruped3d: out of memory; use a smaller network.batch, tta.batch or shards.unit_size\n");
+    return kFailure;
+  } catch (const std::system_error& error) {  // fmt::print throws it too
+    const std::string told = stdout_failed() ? unwritten_stdout(error.code().message()) : error.what();
+    fmt::print(stderr, "quadruped3d: {}\n", told);
     return kFailure;
   } catch (const std::exception& error) {
     fmt::print(stderr, "quadruped3d: {}\n", error.what());

@@ -68,14 +68,22 @@ void prepare_standard_streams() {
   if (::isatty(STDOUT_FILENO) != 0) stdout = stream_to(write_terminal, _IOLBF);
 }
 
+bool stdout_failed() {
+  return std::ferror(stdout) != 0;
+}
+
+std::string unwritten_stdout(const std::string& reason) {
+  return fmt::format(
+      "stdout could not be written ({}), so what was printed is not complete; free some space or give "
+      "another place, "
+      "and run the same command again",
+      reason);
+}
+
 void finish_stdout() {
   const bool is_flushed = std::fflush(stdout) == 0;
-  if (is_flushed && std::ferror(stdout) == 0) return;
-  throw std::runtime_error(
-      fmt::format("stdout could not be written ({}), so what was printed is not complete; free some space or "
-                  "give another "
-                  "place, and run the same command again",
-                  is_flushed ? "an earlier write failed" : std::strerror(errno)));
+  if (is_flushed && !stdout_failed()) return;
+  throw std::runtime_error(unwritten_stdout(is_flushed ? "an earlier write failed" : std::strerror(errno)));
 }
 
 }  // namespace q3d::pipeline::cli

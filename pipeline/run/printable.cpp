@@ -57,11 +57,15 @@ std::string printable_line(std::string_view text) {
   return printable(text, "");
 }
 
-void erase_terminal_line() {
+void draw_terminal_line(std::string_view line) {
   if (!terminal_of_stderr().redraws) return;
-  constexpr std::string_view kErase = "\r\033[K";
-  const ssize_t written = write(STDERR_FILENO, kErase.data(), kErase.size());
+  const std::string drawn = "\r\033[K" + std::string(line);
+  const ssize_t written = write(STDERR_FILENO, drawn.data(), drawn.size());
   static_cast<void>(written);  // a terminal that is gone shows nothing
+}
+
+void erase_terminal_line() {
+  draw_terminal_line("");
 }
 
 }  // namespace q3d::pipeline::run

@@ -61,8 +61,7 @@ void Progress::draw(bool last) {
   state_.is_last = last;
   if (terminal_) {
     const Terminal terminal = terminal_of_stderr();
-    erase_terminal_line();
-    fmt::print(stderr, "{}{}", progress_bar(state_, terminal.columns, terminal.has_colour), last ? "\n" : "");
+    draw_terminal_line(progress_bar(state_, terminal.columns, terminal.has_colour) + (last ? "\n" : ""));
   } else {
     fmt::print(stderr, "{}\n", progress_line(state_));
   }

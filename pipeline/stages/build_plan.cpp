@@ -22,10 +22,6 @@ using nlohmann::ordered_json;
 
 constexpr const char* kFormat = "quadruped3d-build-plan";
 
-fs::path plans_folder(const fs::path& out) {
-  return out / "stages" / "builds";
-}
-
 ordered_json stages_json(const BuildPlan& plan) {
   ordered_json stages = ordered_json::object();
   for (const Stage stage : kStages) {
@@ -88,6 +84,10 @@ std::optional<BuildPlan> read_plan(const fs::path& file) {
 }
 
 }  // namespace
+
+fs::path plans_folder(const fs::path& out) {
+  return out / "stages" / "builds";
+}
 
 std::string version_name(const std::string& name, const StageKeys& keys) {
   return name + "-" + keys.dataset.substr(0, kShortKey);

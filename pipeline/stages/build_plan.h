@@ -39,6 +39,9 @@ BuildPlan plan_of(const config::BuildConfig& config, const config::JudgingRules&
                   const candidates::Ingest& ingest, const AssetDigests& assets, const std::string& device_key,
                   std::vector<std::string> command);
 
+// The folder of the plans. The other folders beside it are those of stages.
+std::filesystem::path plans_folder(const std::filesystem::path& out);
+
 // Where the plan of a version lies.
 std::filesystem::path plan_file(const std::filesystem::path& out, const std::string& version);
 

@@ -9,6 +9,7 @@
 #include "manifests/file_descriptor.h"
 #include "manifests/journal.h"
 #include "pipeline/run/interrupt.h"
+#include "pipeline/stages/build_plan.h"
 #include "pipeline/stages/stages.h"
 
 namespace q3d::pipeline::stages {
@@ -20,7 +21,7 @@ std::vector<fs::path> stage_folders(const fs::path& out) {
   std::vector<fs::path> folders;
   if (!fs::is_directory(out / "stages")) return folders;
   for (const auto& entry : fs::directory_iterator(out / "stages")) {
-    if (entry.is_directory()) folders.push_back(entry.path());
+    if (entry.is_directory() && entry.path() != plans_folder(out)) folders.push_back(entry.path());
   }
   std::sort(folders.begin(), folders.end());
   return folders;

@@ -66,7 +66,7 @@ class BodyPage(unittest.TestCase):
         self.assertEqual(rows, expected)
 
     def test_families_are_in_order(self):
-        source = source_with("kFamilyNames{").split("kFamilyNames{")[1].split("}")[0]
+        source = source_with("EnumNames kFamilies(").split("EnumNames kFamilies(")[1].split("{")[1].split("}")[0]
         names = re.findall(r'"([a-z]+)"', source)[1:]  # the first is "none", -1
         rows = table("body.md", "Shape")
         self.assertEqual([[row[0], row[1].lower()] for row in rows[:-1]], [[str(i), n] for i, n in enumerate(names)])
@@ -75,7 +75,7 @@ class BodyPage(unittest.TestCase):
 
 class TroubleshootingPage(unittest.TestCase):
     def test_every_reason_is_explained_once(self):
-        source = source_with("kReasonNames{").split("kReasonNames{")[1].split("}")[0]
+        source = source_with("EnumNames kReasons(").split("EnumNames kReasons(")[1].split("{")[1].split("}")[0]
         names = re.findall(r'"([a-z_]+)"', source)
         self.assertEqual(names[0], "none")
         rows = table("troubleshooting.md", "Many candidates failed")

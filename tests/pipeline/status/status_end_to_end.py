@@ -44,7 +44,7 @@ class Status(Case):
         for name in FOLDERS:
             with self.subTest(stage=name):
                 manifest = json.loads((out / stages[name]["manifest"]).read_text())
-                self.assertEqual(manifest, {"stage": name, "key": stages[name]["key"]})
+                self.assertEqual((manifest["stage"], manifest["key"]), (name, stages[name]["key"]))
                 self.assertEqual(stages[name]["units_missing"], [])
                 self.assertEqual(stages[name]["units_finished"] + stages[name]["units_not_needed"], UNITS)
         self.assertEqual(build["dataset"], {"manifest": f"{dataset.name}/dataset.json", "is_there": True})
