@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <stdexcept>
+#include <vector>
 
 #include "manifests/atomic_file.h"
 #include "manifests/digest.h"
@@ -27,6 +28,15 @@ ordered_json read_json(const fs::path& file) {
     throw std::runtime_error(fmt::format("{}: not readable JSON: {}; remove its folder and export again",
                                          file.string(), error.what()));
   }
+}
+
+// What a run that was killed left, the pictures' folders included.
+void remove_all_temporaries(const fs::path& out) {
+  std::vector<fs::path> folders{out};
+  for (const auto& entry : fs::recursive_directory_iterator(out)) {
+    if (entry.is_directory()) folders.push_back(entry.path());
+  }
+  for (const fs::path& folder : folders) manifests::remove_temporaries(folder);
 }
 
 }  // namespace
@@ -74,7 +84,7 @@ void ExportFolder::open_parts() {
   } else {
     manifests::write_file_atomically(about_file, about_.dump());
   }
-  manifests::remove_temporaries(parts_);
+  remove_all_temporaries(out_);
   journal_ = std::make_unique<manifests::Journal>(parts_ / "journal.jsonl");
 }
 
