@@ -55,9 +55,9 @@ const Settings<BuildConfig>& build_settings() {
        .member = &BuildConfig::profile,
        .description =
            "the layer that the config starts from: `paper` is empty (the paper's rule alone). `strict` "
-           "adapts every "
-           "prediction that is kept (`tta.refine_retained`) and discards labels that are trusted little "
-           "(`filter.min_trust` 0.8), which made labels more accurate on rendered worlds (docs/results.md)",
+           "adapts every prediction that is kept (`tta.refine_retained`), with a term of the pose prior "
+           "(`tta.pose_prior_weight` 0.003), and discards labels that are trusted little (`filter.min_trust` "
+           "0.8). This made labels more accurate on rendered worlds (docs/results.md)",
        .words = profile_names()},
       {.key = "veto",
        .member = &BuildConfig::veto,

@@ -94,6 +94,17 @@ model::TtaOptions tta_options(const config::TtaConfig& tta) {
   return options;
 }
 
+model::Priors load_needed_priors(const std::filesystem::path& file, torch::Device device) {
+  try {
+    return model::load_priors(smal::tensors::SafeTensors::open(file), device);
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(
+        fmt::format("{}\nThe terms tta.pose_prior_weight and tta.shape_prior_weight need the pose and shape "
+                    "priors: give their file as guards.priors",
+                    error.what()));
+  }
+}
+
 class TorchNetwork : public device::Network {
  public:
   TorchNetwork(const config::NetworkConfig& network, const config::TtaConfig& tta,
@@ -106,9 +117,7 @@ class TorchNetwork : public device::Network {
         prima_(model::Prima::load(
             network.checkpoint, network.smal_asset, device_.device,
             network.dtype == config::Dtype::bfloat16 ? torch::kBFloat16 : torch::kFloat32)) {
-    if (config::uses_priors(tta)) {
-      options_.priors = model::load_priors(smal::tensors::SafeTensors::open(priors), device_.device);
-    }
+    if (config::uses_priors(tta)) options_.priors = load_needed_priors(priors, device_.device);
   }
 
   std::vector<device::BodyPrediction> predict(std::span<const device::PatchView> patches) override;

@@ -271,7 +271,8 @@ class Guards(Case):
         described = json.loads((self.datasets["strict"] / "dataset.json").read_text())
         self.assertEqual(described["profile"], "strict")
         shown = json.loads(run("config", "show").stdout)["profiles"]["strict"]
-        self.assertEqual(shown, {"tta": {"refine_retained": True}, "filter": {"min_trust": 0.8}})
+        self.assertEqual(shown, {"tta": {"refine_retained": True, "pose_prior_weight": 0.003},
+                                 "filter": {"min_trust": 0.8}})
         self.assertEqual(described["provenance"]["config"]["profile"], "strict")
         self.assertEqual(described["provenance"]["priors_sha256"], file_sha256(self.shared / "priors.safetensors"))
         rows = self.verdicts("strict").values()

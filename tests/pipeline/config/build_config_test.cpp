@@ -451,6 +451,7 @@ TEST(Profiles, StrictRefinesAllAndTheConfigIsLaidOverIt) {
   const BuildConfig strict = parse_build_config(config, "t");
   EXPECT_EQ(strict.profile, "strict");
   EXPECT_TRUE(strict.tta.refine_retained);
+  EXPECT_GT(strict.tta.pose_prior_weight, 0.0);
   EXPECT_EQ(strict.tta.batch, 3) << "what the config says stays";
   EXPECT_EQ(judging_rules(strict).min_trust,
             profile_layer("strict").at("filter").at("min_trust").get<double>());
