@@ -94,9 +94,10 @@ PrimaConfig named_config(const std::string& name) {
     config.true_token_grid = true;
     return config;
   }
-  if (name == "lite") {  // starts from an EfficientNet-Lite0 that knows photographs
+  if (name == "lite") {  // both encoders start from an EfficientNet-Lite0 that knows photographs
     config = named_config("small");
     config.stem_depth = 0, config.efficientnet_stem = true;
+    config.clip_stem_depth = 0, config.clip_efficientnet_stem = true;
     return config;
   }
   if (name == "tiny") {

@@ -5,6 +5,8 @@
 #include <string>
 #include <utility>
 
+#include "model/depthwise.h"
+
 namespace q3d::model {
 namespace {
 
@@ -36,11 +38,10 @@ constexpr std::array<double, 3> kDeviation{0.229, 0.224, 0.225};
 constexpr double kLiteMean = 127.0;
 constexpr double kLiteDeviation = 128.0;
 
-// TensorFlow's SAME padding of an even side at stride 2: the odd pixel comes after the last one.
-torch::Tensor pad_for_stride_two(const torch::Tensor& maps, std::int64_t side) {
-  const std::int64_t before = (side - 2) / 2;
-  const std::int64_t after = side - 2 - before;
-  return torch::constant_pad_nd(maps, {before, after, before, after});
+// TensorFlow's SAME padding of maps with an even side: at stride 2, the odd pixel comes after the last one.
+DepthwiseShape same_padding(std::int64_t side, std::int64_t stride) {
+  const std::int64_t padding = side - stride;
+  return {side, stride, padding / 2, padding - padding / 2};
 }
 
 }  // namespace
@@ -72,9 +73,12 @@ class NormedConvolution {
 
   torch::Tensor forward(const torch::Tensor& x) const {
     const torch::Tensor scaled = (weight_ * scale_.view({-1, 1, 1, 1})).to(dtype());
-    const bool strided = sizes_.stride == 2;
-    return torch::conv2d(strided ? pad_for_stride_two(x, sizes_.side) : x, scaled, shift_.to(dtype()),
-                         sizes_.stride, strided ? 0 : sizes_.side / 2, /*dilation=*/1, sizes_.groups);
+    const DepthwiseShape shape = same_padding(sizes_.side, sizes_.stride);
+    if (sizes_.groups > 1) return depthwise_convolution(x, scaled, shift_, shape);
+    const torch::Tensor padded =
+        shape.after > 0 ? torch::constant_pad_nd(x, {shape.before, shape.after, shape.before, shape.after})
+                        : x;
+    return torch::conv2d(padded, scaled, shift_.to(dtype()), shape.stride);
   }
 
   torch::Tensor forward_relu6(const torch::Tensor& x) const {
