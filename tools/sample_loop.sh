@@ -24,9 +24,9 @@ train() {
 prepare() {
   say "the rendered world"
   [ -f data/world/world.json ] || "$program" sample --out data/world
-  say "training pools: every annotation packed into shards"
+  say "training pools and the held-out one: every annotation packed into shards"
   local pool
-  for pool in animal3d ctrlani3d superanimal; do
+  for pool in animal3d ctrlani3d superanimal held_out; do
     "$program" build --config "configs/world_pools/$pool.json" --out "$home/pools/$pool"
   done
   [ -f "$home/initial.safetensors" ] && [ -f "$home/priors.safetensors" ] ||

@@ -40,6 +40,10 @@ std::vector<ErrorQuantile> quantiles_from(const json& l_proj) {
 
 }  // namespace
 
+Pictures pictures_from_string(std::string_view name) {
+  return kPictures.value(name);
+}
+
 std::string to_json(const NetworkDomain& domain) {
   json document = {{"pictures", kPictures.name(domain.pictures)}, {"trained_on", domain.trained_on}};
   if (!domain.quantiles.empty()) {

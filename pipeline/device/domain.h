@@ -1,11 +1,12 @@
 // The domain of a checkpoint describes the pictures that its network knows. It stands in the file's metadata
-// under kDomainKey. tools/describe_checkpoint.py writes it from an evaluation; tools/import_assets.py writes
-// what the paper states.
+// under kDomainKey. `train` writes it (pipeline/training/held_out.h), tools/import_assets.py writes what the
+// paper states, and tools/describe_checkpoint.py adds it to a checkpoint that has none.
 #pragma once
 
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace q3d::pipeline::device {
@@ -15,6 +16,8 @@ inline constexpr const char* kDomainKey = "prima_domain";  // in the metadata of
 inline constexpr const char* kSyntheticBodyName = "synthetic quadruped";
 
 enum class Pictures : std::uint8_t { unknown, photographs, rendered };
+// Throws std::invalid_argument for another name.
+Pictures pictures_from_string(std::string_view name);
 
 struct ErrorQuantile {
   double share = 0.0;   // of the held-out pictures, between 0 and 1

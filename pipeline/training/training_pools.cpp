@@ -40,11 +40,9 @@ std::string problem_of(const fs::path& shard) {
 
 }  // namespace
 
-TrainingPools::TrainingPools(const std::vector<settings::PhaseConfig>& phases, bool skip_damaged) {
-  for (const settings::PhaseConfig& phase : phases) {
-    for (const settings::PoolConfig& pool : phase.pools) {
-      if (!pools_.contains(pool.name)) check(pool, skip_damaged);
-    }
+TrainingPools::TrainingPools(const std::vector<settings::PoolConfig>& pools, bool skip_damaged) {
+  for (const settings::PoolConfig& pool : pools) {
+    if (!pools_.contains(pool.name)) check(pool, skip_damaged);
   }
   if (!skip_damaged && !left_out_.empty()) refuse(left_out_);
 }

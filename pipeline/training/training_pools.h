@@ -16,14 +16,14 @@ namespace q3d::pipeline::training {
 
 class TrainingPools {
  public:
-  // Reads all shards of the phases' pools whole (feed::check_shards) and looks at every record
+  // Reads all shards of the pools whole (feed::check_shards) and looks at every record
   // (feed::find_damaged_records). Damage throws std::runtime_error that counts and names it, or, with
   // `skip_damaged`, is left out: a damaged shard with all its records, because nothing says which of them are
   // true, and single records. Then every stored crop is decoded, too. Throws ConfigError if a pool has no
   // sample left, Interrupted, and like check_shards.
-  TrainingPools(const std::vector<settings::PhaseConfig>& phases, bool skip_damaged);
+  TrainingPools(const std::vector<settings::PoolConfig>& pools, bool skip_damaged);
 
-  // A pool of a phase, without what is left out.
+  // One of the pools, without what is left out.
   feed::ShardPool open(const std::string& name) const;
   // What decides which samples there are: the shards' digests, by pool, and what of them is left out.
   const nlohmann::json& identity() const { return identity_; }

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <map>
 #include <numeric>
 #include <optional>
 #include <stdexcept>
@@ -24,11 +25,14 @@
 #include "model/ranks/process_group.h"
 #include "model/ranks/rank_place.h"
 #include "model/trainer.h"
+#include "pipeline/device/domain.h"
 #include "pipeline/run/command_line.h"
 #include "pipeline/run/errors.h"
 #include "pipeline/run/interrupt.h"
 #include "pipeline/run/log.h"
 #include "pipeline/run/progress.h"
+#include "pipeline/training/batch_tensors.h"
+#include "pipeline/training/held_out.h"
 #include "pipeline/training/rank_agreement.h"
 #include "pipeline/training/training_log.h"
 #include "pipeline/training/training_pools.h"
@@ -86,28 +90,6 @@ model::DeviceChoice choose_device(const TrainingNetworkConfig& network,
   } catch (const std::invalid_argument& error) {
     throw run::ConfigError(error.what());
   }
-}
-
-// Tensors over the batch's arrays, which they keep alive.
-model::TrainingBatch to_tensors(feed::FeedBatch&& from) {
-  const auto batch = std::make_shared<feed::FeedBatch>(std::move(from));
-  const auto view = [&batch](auto* data, std::vector<std::int64_t> shape, torch::ScalarType dtype) {
-    shape.insert(shape.begin(), batch->size);
-    return torch::from_blob(
-        data, shape, [batch](void*) {}, dtype);
-  };
-  model::TrainingBatch result;
-  result.images = view(batch->images.get(), {3, smal::kCropSidePx, smal::kCropSidePx}, torch::kFloat32);
-  model::Targets& targets = result.targets;
-  targets.keypoints_2d = view(batch->keypoints_2d.data(), {smal::kNumKeypoints, 3}, torch::kFloat32);
-  targets.keypoints_3d = view(batch->keypoints_3d.data(), {smal::kNumKeypoints, 4}, torch::kFloat32);
-  targets.rotations = view(batch->rotations.data(), {smal::kNumJoints, 3, 3}, torch::kFloat32);
-  targets.betas = view(batch->betas.data(), {smal::kNumBetas}, torch::kFloat32);
-  targets.has_pose = view(batch->has_pose.data(), {}, torch::kFloat32);
-  targets.has_betas = view(batch->has_betas.data(), {}, torch::kFloat32);
-  targets.family = view(batch->family.data(), {}, torch::kInt64);
-  result.species = view(batch->species.data(), {}, torch::kInt64);
-  return result;
 }
 
 // The config with the precision "auto" replaced by what suits the device. The run's key keeps "auto", as it
@@ -239,6 +221,29 @@ feed::Feed open_feed(const TrainingConfig& config, const PhaseConfig& phase, int
   }
 }
 
+std::vector<PoolConfig> pools_of(const std::vector<PhaseConfig>& phases) {
+  std::vector<PoolConfig> pools;
+  for (const PhaseConfig& phase : phases) pools.insert(pools.end(), phase.pools.begin(), phase.pools.end());
+  return pools;
+}
+
+// The held-out pool. Throws ConfigError if training draws from one of its shards.
+TrainingPools held_out_pools(const TrainingConfig& config, const TrainingPools& trained, bool skip_damaged) {
+  if (config.domain.held_out.empty()) return {{}, skip_damaged};
+  TrainingPools pools({config.domain.held_out_pool}, skip_damaged);
+  for (const auto& [pool, shards] : trained.identity().items()) {
+    for (const auto& digest : pools.identity().at(config.domain.held_out)) {
+      if (digest.is_string() && std::find(shards.begin(), shards.end(), digest) != shards.end()) {
+        throw run::ConfigError(fmt::format(
+            "domain: held_out: the pool {} shares a shard with the pool {}, which this stage trains on; "
+            "expected pictures that training does not see",
+            config.domain.held_out, pool));
+      }
+    }
+  }
+  return pools;
+}
+
 class Run {
  public:
   Run(const TrainingConfig& config, const TrainingOptions& options)
@@ -250,7 +255,8 @@ class Run {
         lock_(leads() ? std::make_unique<manifests::FolderLock>(made(options.out)) : nullptr),
         asset_(smal::tensors::load_asset(config.network.smal_asset)),
         priors_(model::load_priors(smal::tensors::SafeTensors::open(config.network.priors), device_.device)),
-        pools_(config.phases, options.skip_damaged),
+        pools_(pools_of(config.phases), options.skip_damaged),
+        held_out_(held_out_pools(config, pools_, options.skip_damaged)),
         key_(run_key(config, pools_.identity())),
         stored_(load_state(state_path(), key_)) {
     if (stored_) position_ = stored_->position;
@@ -293,7 +299,7 @@ class Run {
     summary.steps_done = steps_done();
     summary.finished = position_.phase == static_cast<int>(config_.phases.size());
     summary.seconds = seconds_since(start_);
-    if (summary.finished) summary.model = write_model(*net);
+    if (summary.finished) summary.model = write_model(net);
     meet();
     return summary;
   }
@@ -418,15 +424,35 @@ class Run {
     throw std::runtime_error(message);
   }
 
-  fs::path write_model(const model::PrimaNet& net) const {
+  // The domain in the finished weights' metadata; none if the config says nothing of it, and for weights
+  // whose last phase trained the encoders alone, since such a network predicts no bodies yet.
+  std::map<std::string, std::string> domain_of(const std::shared_ptr<model::PrimaNet>& net) const {
+    const settings::DomainConfig& domain = config_.domain;
+    if (domain.pictures.empty() || config_.phases.back().objective != Objective::prima) return {};
+    device::NetworkDomain described{
+        device::pictures_from_string(domain.pictures), domain.trained_on, {}, 0, {}};
+    if (!domain.held_out.empty()) {
+      if (!options_.quiet) run::log_info(fmt::format("predicting {} held-out samples", domain.samples));
+      feed::FeedOptions feed = config_.feed;
+      feed.augment = false;
+      feed.threads = options_.threads;
+      std::vector<feed::ShardPool> pools;
+      pools.push_back(held_out_.open(domain.held_out));
+      described = measure_domain(domain, net, smal::tensors::SmalBody(asset_, device_.device),
+                                 feed::Feed(std::move(pools), {1.0}, feed, config_.seed));
+    }
+    return {{device::kDomainKey, device::to_json(described)}};
+  }
+
+  fs::path write_model(const std::shared_ptr<model::PrimaNet>& net) const {
     const fs::path path = options_.out / "model.safetensors";
     if (!leads()) return path;
     smal::tensors::NamedTensors tensors;
-    model::append_parameters(tensors, "", net);
+    model::append_parameters(tensors, "", *net);
     if (config_.model_dtype == ModelDtype::float16) {
       for (auto& [name, tensor] : tensors) tensor = tensor.to(torch::kFloat16);
     }
-    model::write_checkpoint(path, net.config(), tensors);
+    model::write_checkpoint(path, net->config(), tensors, domain_of(net));
     return path;
   }
 
@@ -440,6 +466,7 @@ class Run {
   smal::tensors::SmalAsset asset_;
   model::Priors priors_;
   TrainingPools pools_;
+  TrainingPools held_out_;  // has no pool if the config names none
   std::string key_;
   std::optional<StoredState> stored_;
   TrainingPosition position_;

@@ -86,6 +86,17 @@ std::vector<PhaseConfig> parse_stage(const json& stages, const std::string& wher
   return result;
 }
 
+DomainConfig parse_domain(const json& object, const std::string& where, const Pools& pools) {
+  DomainConfig domain;
+  parse_object(object, where, domain_settings(), domain);
+  if (domain.held_out.empty()) return domain;
+  std::vector<std::string> known;
+  for (const auto& [name, pool] : pools) known.push_back(name);
+  config::require_one_of(domain.held_out, known, where + ": held_out");
+  domain.held_out_pool = pools.at(domain.held_out);
+  return domain;
+}
+
 void resolve_paths(json& config, const fs::path& folder) {
   if (config.contains("network")) {
     for (const char* key : {"initial", "encoders", "smal_asset", "priors"}) {
@@ -129,6 +140,9 @@ TrainingConfig parse_training_config(const json& merged, const std::string& wher
   config::read_settings(fields, training_settings(), config);
   if (const json* object = fields.child("augmentation")) {
     parse_object(*object, where + ": augmentation", augmentation_settings(), config.feed.augmentation);
+  }
+  if (const json* object = fields.child("domain")) {
+    config.domain = parse_domain(*object, where + ": domain", pools);
   }
   if (const json* object = fields.child("loss_weights")) {
     parse_object(*object, where + ": loss_weights", loss_weight_settings(), config.loss_weights);

@@ -46,11 +46,21 @@ struct PhaseConfig {
   Decay decay = Decay::linear;
 };
 
+// What the finished weights say about the pictures that they know (pipeline/device/domain.h).
+struct DomainConfig {
+  std::string pictures;    // "photographs" or "rendered"; empty says nothing
+  std::string trained_on;  // for people
+  std::string held_out;    // name of the pool that L_proj is measured on; empty measures nothing
+  PoolConfig held_out_pool;
+  int samples = 500;  // draws from that pool
+};
+
 struct TrainingConfig {
   TrainingNetworkConfig network;
   std::vector<PhaseConfig> phases;  // of the chosen stage
   feed::FeedOptions feed;
   int feed_ahead = 2;  // batches prepared in the background
+  DomainConfig domain;
   model::settings::LossWeights loss_weights;
   model::settings::LossVariant loss_variant = model::settings::LossVariant::sound;
   double backbone_rate = 0.1;  // of the learning rate, in phases with the objective "prima"

@@ -30,6 +30,7 @@ ordered_json training_config_schema() {
   properties["pools"] = any_names(config::whole_object_schema(facts_of(pool_settings())));
   properties["stages"] = stages_schema();
   properties["augmentation"] = config::object_schema(facts_of(augmentation_settings()));
+  properties["domain"] = config::object_schema(facts_of(domain_settings()));
   properties["loss_weights"] = config::object_schema(facts_of(loss_weight_settings()));
   return config::schema_document("A training config of quadruped3d", schema);
 }

@@ -296,6 +296,32 @@ const Settings<AugmentOptions>& augmentation_settings() {
   return kSettings;
 }
 
+const Settings<DomainConfig>& domain_settings() {
+  static const Settings<DomainConfig> kSettings{
+      {.key = "pictures",
+       .member = &DomainConfig::pictures,
+       .description =
+           "kind of the pictures that the network is trained on. `build` and `calibrate` warn if a "
+           "network that knows rendered pictures alone meets photographs",
+       .words = {"photographs", "rendered"},
+       .is_required = true},
+      {.key = "trained_on",
+       .member = &DomainConfig::trained_on,
+       .description = "for people: which data these are",
+       .is_required = true},
+      {.key = "held_out",
+       .member = &DomainConfig::held_out,
+       .description =
+           "name of a pool that the stage does not train on. The finished network predicts draws "
+           "from it, and the quantiles of their L_proj are stored; `build` and `calibrate` warn if "
+           "a pool's errors lie far outside them"},
+      {.key = "samples",
+       .member = &DomainConfig::samples,
+       .description = "number of draws from the held-out pool, with replacement",
+       .range = {.least = 20, .most = 1000000}}};
+  return kSettings;
+}
+
 const Settings<LossWeights>& loss_weight_settings() {
   const auto weight = [](const char* key, double LossWeights::*member, const char* of) {
     return config::Setting<LossWeights>{
@@ -322,6 +348,7 @@ config::SettingsTables training_settings_tables() {
           {"pools", config::facts_of(pool_settings())},
           {"phases", config::facts_of(phase_settings())},
           {"augmentation", config::facts_of(augmentation_settings())},
+          {"domain", config::facts_of(domain_settings())},
           {"loss weights", config::facts_of(loss_weight_settings())}};
 }
 

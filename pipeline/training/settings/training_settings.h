@@ -13,9 +13,11 @@ const config::Settings<PoolConfig>& pool_settings();
 const config::Settings<PhaseConfig>& phase_settings();
 const config::Settings<feed::FeedOptions>& feed_settings();  // keys of the top level too
 const config::Settings<loaders::pictures::AugmentOptions>& augmentation_settings();
+const config::Settings<DomainConfig>& domain_settings();
 const config::Settings<model::settings::LossWeights>& loss_weight_settings();
 
-// The tables of docs/training.md: training, training network, pools, phases, augmentation and loss weights.
+// The tables of docs/training.md: training, training network, pools, phases, augmentation, domain and loss
+// weights.
 config::SettingsTables training_settings_tables();
 
 }  // namespace q3d::pipeline::training::settings

@@ -313,7 +313,7 @@ TEST(BuildConfig, TruthIsRefusedWhereTheFormatHasNoBodies) {
 
 TEST(BuildConfig, TheShippedConfigsOfTheWorldAreSound) {
   const std::filesystem::path configs = testing::data_dir() / "../../configs";
-  for (const char* pool : {"animal3d", "ctrlani3d", "superanimal"}) {
+  for (const char* pool : {"animal3d", "ctrlani3d", "superanimal", "held_out"}) {
     const BuildConfig config = load_build_config({configs / "world_pools" / (std::string(pool) + ".json")});
     EXPECT_FALSE(needs_network(config)) << pool;
     EXPECT_EQ(config.datasets[0].root.parent_path(),

@@ -12,6 +12,7 @@
 #include "manifests/sealed_json.h"
 #include "model/checkpoint.h"
 #include "model/prima.h"
+#include "pipeline/device/domain.h"
 #include "pipeline/run/errors.h"
 #include "smal/tensors/asset.h"
 #include "tests/pipeline/feed/sample_shards.h"
@@ -63,7 +64,7 @@ class TrainingRun : public ::testing::Test {
   static std::string message(const std::function<void()>& call) {
     try {
       call();
-    } catch (const std::runtime_error& error) {
+    } catch (const std::exception& error) {
       return error.what();
     }
     return "nothing thrown";
@@ -211,6 +212,60 @@ TEST_F(TrainingRun, TheWeightsLoadAsACheckpoint) {
   EXPECT_FALSE(
       torch::equal(before.tensor("smal_head.decpose.2.weight"), after.tensor("smal_head.decpose.2.weight")));
   EXPECT_NO_THROW(model::Prima::load(path("out/state.safetensors"), path("asset"), torch::kCPU));
+}
+
+// L_proj of a sample by its definition, without the program's own metric.
+double l_proj_of(const std::filesystem::path& model, const std::filesystem::path& asset,
+                 const std::filesystem::path& shard) {
+  feed::FeedOptions options;
+  options.batch = 1;
+  options.augment = false;
+  std::vector<feed::ShardPool> pools;
+  pools.emplace_back("one", std::vector{shard});
+  feed::FeedBatch batch = feed::Feed(std::move(pools), {1.0}, options, 0).batch(0);
+  const model::Prima prima = model::Prima::load(model, asset, torch::kCPU);
+  const torch::Tensor images = torch::from_blob(batch.images.get(), {1, 3, 256, 256});
+  const torch::Tensor projected = prima.predict(prima.encode(images)).keypoints_2d[0];
+  const torch::Tensor labels = torch::from_blob(batch.keypoints_2d.data(), {26, 3});
+  const torch::Tensor visible = labels.select(1, 2) > 0;
+  return (projected - labels.narrow(1, 0, 2)).abs().index({visible}).mean().item<double>();
+}
+
+// Every draw from a pool of one sample is that sample, so all quantiles are its L_proj.
+TEST_F(TrainingRun, TheWeightsSayWhatTheyKnow) {
+  testing::write_sample_shard(path("unseen.h5"), "unseen", 1, 90);
+  const TrainingSummary silent = run("silent");
+  config_.domain = {"rendered", "two shards", "unseen", {"unseen", {path("unseen.h5").string()}, 1.0}, 21};
+  const TrainingSummary summary = run("out");
+  const smal::tensors::SafeTensors without = smal::tensors::SafeTensors::open(silent.model);
+  const smal::tensors::SafeTensors with = smal::tensors::SafeTensors::open(summary.model);
+  EXPECT_FALSE(without.metadata().contains(device::kDomainKey));
+  for (const std::string& name : with.names()) {
+    EXPECT_TRUE(torch::equal(with.tensor(name), without.tensor(name))) << name;
+  }
+  const device::NetworkDomain domain = device::domain_from_json(with.metadata().at(device::kDomainKey));
+  EXPECT_EQ(domain.pictures, device::Pictures::rendered);
+  EXPECT_EQ(domain.trained_on, "two shards");
+  EXPECT_EQ(domain.held_out, "unseen");
+  EXPECT_EQ(domain.held_out_pictures, 22);  // whole batches of two
+  const double expected = l_proj_of(summary.model, path("asset"), path("unseen.h5"));
+  EXPECT_GT(expected, 0.001);
+  ASSERT_EQ(domain.quantiles.size(), 5U);
+  for (const device::ErrorQuantile& each : domain.quantiles) EXPECT_NEAR(each.l_proj, expected, 1e-5);
+}
+
+TEST_F(TrainingRun, AHeldOutPoolThatTrainingSeesIsRefused) {
+  config_.domain = {"rendered", "two shards", "again", {"again", {path("second.h5").string()}, 1.0}, 20};
+  const std::string text = message([&] { run("out"); });
+  EXPECT_THAT(text, HasSubstr("the pool again shares a shard with the pool second"));
+  EXPECT_FALSE(std::filesystem::exists(path("out/model.safetensors")));
+}
+
+TEST_F(TrainingRun, EncodersAloneSayNothingOfBodies) {
+  const PoolConfig first{"first", {path("first.h5").string()}, 1.0};
+  config_.phases = {{"encoders", Objective::encoders, {}, {first}, 1, 1, false, 1e-3, 0, Decay::none}};
+  config_.domain = {"rendered", "one shard", "", {}, 20};
+  EXPECT_FALSE(smal::tensors::SafeTensors::open(run("out").model).metadata().contains(device::kDomainKey));
 }
 
 TEST_F(TrainingRun, AFinishedRunHasNothingToDo) {
