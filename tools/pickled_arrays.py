@@ -15,6 +15,9 @@ from restricted_pickle import BrokenPickle, Global, Record
 # The largest table in the official SMAL files has 3.6 million numbers. The limit is needed because a sparse matrix can
 # declare any shape in a few bytes.
 MAX_DENSE_ELEMENTS = 1 << 26
+# Lists can hold one list many times over, so that a pickle of 400 bytes describes a table of billions. The official
+# files hold their tables as arrays and use lists for a few sizes only.
+MAX_LIST_ITEMS = 1_000_000
 
 _NUMPY_MAKERS = re.compile(r"numpy\.(_?core)\.(multiarray|numeric)\.(_reconstruct|_frombuffer|scalar)")
 _SPARSE_CLASS = re.compile(r"scipy\.sparse\.(\w+\.)*(csc|csr|coo)_(matrix|array)")
@@ -24,6 +27,42 @@ _PLAIN_DTYPE = re.compile(r"[<>|=]?(b1|[iu][1248]|f[248])")
 def array(value, what: str) -> np.ndarray:
     """Returns the array that `value` describes: a numpy array or scalar, a chumpy array that stores its numbers, a
     number, or a (nested) list of these with equal shapes. Throws BrokenPickle, whose message names `what`."""
+    if isinstance(value, (list, tuple)):
+        _refuse_bombs(value, what)
+    return _array(value, what)
+
+
+def _refuse_bombs(value, what: str) -> None:
+    """Throws BrokenPickle if the table that lists describe is too large to be walked or to be held. Every list and every
+    record is looked at once, however often it is shared."""
+    known: dict[int, tuple[int, int]] = {}
+
+    def measure(part) -> tuple[int, int]:
+        """How many items a walk over the part visits, and how many numbers it describes."""
+        if not isinstance(part, (list, tuple, Record)):
+            return 1, 1
+        if id(part) in known:
+            return known[id(part)]
+        known[id(part)] = (MAX_LIST_ITEMS + 1, 0)  # for a list that holds itself
+        if isinstance(part, Record):
+            known[id(part)] = (1, _array(part, what).size)
+        else:
+            sizes = [measure(item) for item in part]
+            known[id(part)] = (1 + sum(items for items, _ in sizes), sum(numbers for _, numbers in sizes))
+        return known[id(part)]
+
+    try:
+        items, numbers = measure(value)
+    except RecursionError:
+        raise BrokenPickle(f"{what} is not a rectangular table of numbers: its lists lie too deep in each other") from None
+    if items > MAX_LIST_ITEMS or numbers > MAX_DENSE_ELEMENTS:
+        raise BrokenPickle(
+            f"{what} is a list that describes more than {MAX_LIST_ITEMS:,} items or {MAX_DENSE_ELEMENTS:,} numbers; "
+            "no known file has such a list"
+        )
+
+
+def _array(value, what: str) -> np.ndarray:
     if isinstance(value, Record):
         if value.path == "chumpy.ch.Ch":
             return array(_chumpy_numbers(value, what), what)
@@ -36,7 +75,7 @@ def array(value, what: str) -> np.ndarray:
     try:
         if isinstance(value, (int, float)):
             return np.asarray(value, np.float64 if isinstance(value, float) else np.int64)
-        return np.stack([array(item, f"{what}[{i}]") for i, item in enumerate(value)])
+        return np.stack([_array(item, f"{what}[{i}]") for i, item in enumerate(value)])
     except (ValueError, OverflowError, RecursionError) as error:
         raise BrokenPickle(f"{what} is not a rectangular table of numbers: {error}") from None
 

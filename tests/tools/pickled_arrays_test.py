@@ -1,6 +1,8 @@
 """Compares how numpy, chumpy and scipy objects are read from pickles with the arrays that were pickled."""
 
 import pickle
+import time
+import tracemalloc
 import unittest
 
 import numpy as np
@@ -56,6 +58,28 @@ class NumpyTest(unittest.TestCase):
         np.testing.assert_array_equal(array(pairs, "x"), value[0])
         np.testing.assert_array_equal(array(stacked, "x"), value[1])
         self.assertEqual(array(number, "x"), 1.5)
+
+    def test_lists_that_hold_each_other_many_times(self):
+        """Pickles of some hundred bytes that describe tables of billions, or that never end."""
+        laughs = [1.0] * 10
+        for _ in range(40):
+            laughs = [laughs] * 10
+        large = np.zeros(1 << 20)
+        endless = [1.0]
+        endless.append(endless)
+        for name, value in (("lists", laughs), ("one array, many times", [large] * 100), ("itself", endless)):
+            with self.subTest(name):
+                data = pickle.dumps(value, 2)
+                tracemalloc.start()
+                started = time.process_time()
+                self.assertRaisesRegex(BrokenPickle, "no known file has such a list", array, read(data), "x")
+                self.assertLess(time.process_time() - started, 10.0)
+                self.assertLess(tracemalloc.get_traced_memory()[1], 2 * len(data) + 10_000_000)
+                tracemalloc.stop()
+        deep = [1.0]
+        for _ in range(5_000):
+            deep = [deep]
+        self.assertRaisesRegex(BrokenPickle, "too deep", array, deep, "x")
 
     def test_values_that_are_not_arrays(self):
         objects = np.array([None, {}], dtype=object)
