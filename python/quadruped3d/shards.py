@@ -27,6 +27,7 @@ SCHEMAS = (1, 2)
 
 # The end of a dataset.json: the SHA-256 of all bytes before these two lines. Only files of schema 1 have none.
 _SEAL = re.compile(rb'  "digest": "([0-9a-f]{64})"\n}\n\Z')
+_SHARD_NAME = re.compile(r"shards/[A-Za-z0-9_-][A-Za-z0-9_.-]*\.h5")
 
 # The columns that schema 2 adds. A shard of schema 1 is read as if they had not been measured: NaN.
 TRUST_COLUMNS = (
@@ -226,8 +227,10 @@ def read_manifest(source: Source) -> dict[str, Any]:
         raise ShardError(f"{file}: its text is not the one that its member \"digest\" was made of: it is damaged")
     try:
         manifest: dict[str, Any] = json.loads(content)
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise ShardError(f"{file}: not readable JSON: {error}") from error
+    if not isinstance(manifest, dict):
+        raise ShardError(f"{file}: got no JSON object, expected one")
     if manifest.get("format") != "quadruped3d-dataset":
         raise ShardError(f"{file}: format is {manifest.get('format')!r}, expected \"quadruped3d-dataset\"")
     if not sealed and ("digest" in manifest or manifest.get("schema") != 1):
@@ -247,12 +250,19 @@ def shard_files(source: Source) -> list[pathlib.Path]:
         return [path]
     for folder in (path, path / "latest"):
         if (folder / "dataset.json").is_file():
-            return [folder / str(entry["file"]) for entry in read_manifest(folder)["shards"]]
+            return [folder / _shard_name(entry["file"], folder) for entry in read_manifest(folder)["shards"]]
     for folder in (path, path / "shards"):
         files = sorted(folder.glob("*.h5"))
         if files:
             return files
     raise ShardError(f"{source}: neither a shard nor a folder of a dataset or of shards")
+
+
+def _shard_name(name: Any, folder: pathlib.Path) -> str:
+    """The name of a shard in dataset.json, which must not lead out of the folder."""
+    if isinstance(name, str) and _SHARD_NAME.fullmatch(name):
+        return name
+    raise ShardError(f"{folder / 'dataset.json'}: the list of shards names {name!r}, expected shards/NAME.h5")
 
 
 def open_shards(sources: Source | Iterable[Source]) -> list[Shard]:

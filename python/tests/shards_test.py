@@ -141,6 +141,20 @@ class Datasets(Folder):
             with self.assertRaises(ShardError, msg=f"byte {at}"):
                 read_manifest(folder)
 
+    def test_a_hostile_manifest_leads_nowhere_else(self):
+        folder = self.make(["000000.h5"], ["000000.h5"])
+        outside = self.folder / "outside.h5"
+        outside.write_bytes((folder / "shards/000000.h5").read_bytes())
+        manifest = {"format": "quadruped3d-dataset", "schema": 1, "name": "set"}
+        for name in (str(outside), "../outside.h5", "shards/../../outside.h5", "shards/..", "shards/a\0.h5", 7, None):
+            (folder / "dataset.json").write_text(json.dumps({**manifest, "shards": [{"file": name}]}))
+            with self.assertRaisesRegex(ShardError, "the list of shards names"):
+                shard_files(folder)
+        for text in ("[" * 100_000, "[" * 100_000 + "]" * 100_000, "7"):
+            (folder / "dataset.json").write_text(text)
+            with self.assertRaisesRegex(ShardError, "JSON"):
+                shard_files(folder)
+
     def test_a_folder_of_shards_needs_no_manifest(self):
         folder = self.make(["b.h5", "a.h5"], [])
         (folder / "dataset.json").unlink()
