@@ -12,6 +12,7 @@
 #include "manifests/atomic_file.h"
 #include "manifests/checked_line.h"
 #include "manifests/file_descriptor.h"
+#include "manifests/json_parse.h"
 
 namespace q3d::manifests {
 namespace {
@@ -31,13 +32,15 @@ std::optional<JournalEntry> parse_line(std::string_view line) {
   const auto payload = open_line(line);
   if (!payload) return std::nullopt;
   try {
-    const auto json = nlohmann::json::parse(*payload);
+    const auto json = parse_json<nlohmann::json>(*payload);
     JournalEntry entry{json.at("unit").get<std::int64_t>(),  json.at("input").get<std::string>(),
                        json.at("file").get<std::string>(),   json.at("sha256").get<std::string>(),
                        json.at("bytes").get<std::int64_t>(), json.at("rows").get<std::int64_t>()};
     if (!stays_in_folder(entry.file)) return std::nullopt;
     return entry;
   } catch (const nlohmann::json::exception&) {
+    return std::nullopt;
+  } catch (const std::runtime_error&) {  // too deep, or a key twice
     return std::nullopt;
   }
 }

@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <string_view>
 
-#include "manifests/json_keys.h"
+#include "manifests/json_parse.h"
 #include "manifests/text_file.h"
 
 namespace q3d::manifests {
@@ -92,7 +92,9 @@ nlohmann::json read_json_file(const std::filesystem::path& file) {
   std::string text = read_text_file(file, "an annotation file in JSON");
   mask_numbers_beyond_json(text);
   try {
-    return nlohmann::json::parse(text, refuse_repeated_keys<nlohmann::json>());
+    return parse_json<nlohmann::json>(text);
+  } catch (const TooDeep& error) {
+    throw std::runtime_error(fmt::format("{}: {}", file.string(), error.what()));
   } catch (const RepeatedKey& error) {
     throw std::runtime_error(fmt::format("{}: {}", file.string(), error.what()));
   } catch (const nlohmann::json::parse_error& error) {

@@ -7,7 +7,7 @@
 
 #include "manifests/atomic_file.h"
 #include "manifests/digest.h"
-#include "manifests/json_keys.h"
+#include "manifests/json_parse.h"
 
 namespace q3d::manifests {
 namespace {
@@ -35,10 +35,12 @@ std::optional<Parts> split(std::string_view text) {
 
 ordered_json parse_object(const std::filesystem::path& file, const std::string& text) {
   try {
-    ordered_json document = ordered_json::parse(text, refuse_repeated_keys<ordered_json>());
+    ordered_json document = parse_json<ordered_json>(text);
     if (document.is_object()) return document;
   } catch (const ordered_json::exception& error) {
     throw DamagedDocument(fmt::format("{}: not readable JSON: {}", file.string(), error.what()));
+  } catch (const TooDeep& error) {
+    throw DamagedDocument(fmt::format("{}: {}", file.string(), error.what()));
   } catch (const RepeatedKey& error) {
     throw DamagedDocument(fmt::format("{}: {}", file.string(), error.what()));
   }

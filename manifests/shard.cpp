@@ -9,6 +9,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "manifests/json_parse.h"
 #include "manifests/keypoint_names.h"
 #include "manifests/shard_columns.h"
 
@@ -40,7 +41,7 @@ std::string describe_datasets(const std::map<std::string, DatasetTerms>& dataset
 
 std::map<std::string, DatasetTerms> datasets_from(const std::string& text) {
   std::map<std::string, DatasetTerms> datasets;
-  const nlohmann::json object = nlohmann::json::parse(text);
+  const nlohmann::json object = parse_json<nlohmann::json>(text);
   for (const auto& [name, terms] : object.items()) {
     datasets[name] = {terms.at("licence").get<std::string>(), terms.at("source_url").get<std::string>(),
                       terms.at("citation").get<std::string>()};

@@ -15,6 +15,8 @@
 
 #include "loaders/formats/sleap.h"
 
+#include "manifests/json_parse.h"
+
 namespace q3d::loaders::formats {
 namespace {
 
@@ -45,7 +47,7 @@ Layout layout_of(const std::vector<std::uint64_t>& extents, const std::vector<st
 std::vector<std::size_t> stated_order(const ForeignHdf5& file) {
   const auto dims = file.text_attribute("tracks", "dims");
   if (!dims) return {};
-  const nlohmann::json list = nlohmann::json::parse(*dims, nullptr, /*allow_exceptions=*/false);
+  const nlohmann::json list = manifests::parse_json_or_null<nlohmann::json>(*dims);
   std::vector<std::size_t> order;
   for (const nlohmann::json& name : list.is_array() ? list : nlohmann::json::array()) {
     const std::string text = name.is_string() ? name.get<std::string>() : std::string();

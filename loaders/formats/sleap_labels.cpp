@@ -24,6 +24,7 @@
 
 #include "loaders/formats/hdf5_claims.h"
 #include "loaders/formats/sleap.h"
+#include "manifests/json_parse.h"
 
 namespace q3d::loaders::formats {
 namespace {
@@ -35,8 +36,8 @@ constexpr double kCentredFormat = 1.1;
 constexpr std::uint64_t kLargestSidePx = 1'000'000;
 
 json parsed(const std::string& text, const std::string& where) {
-  json value = json::parse(text, nullptr, /*allow_exceptions=*/false);
-  if (value.is_discarded()) refuse(where, "text that is not JSON", "JSON");
+  json value = manifests::parse_json_or_null<json>(text);
+  if (value.is_null()) refuse(where, "text that is not JSON", "JSON");
   return value;
 }
 

@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "manifests/atomic_file.h"
+#include "manifests/json_parse.h"
 #include "manifests/record_json.h"
 #include "pipeline/candidates/body_check.h"
 #include "pipeline/candidates/configured_dataset.h"
@@ -146,7 +147,7 @@ bool is_rendered(const std::filesystem::path& root) {
   for (const auto& place : {folder, folder.parent_path()}) {
     const std::filesystem::path file = place / "world.json";
     if (!std::filesystem::is_regular_file(file)) continue;
-    const auto world = nlohmann::json::parse(manifests::read_file(file), nullptr, false);
+    const auto world = manifests::parse_json_or_null<nlohmann::json>(manifests::read_file(file));
     const auto options = world.is_object() ? world.find("options") : world.end();
     if (options != world.end() && options->contains("picture_px") && options->contains("seed")) return true;
   }

@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "manifests/enum_names.h"
+#include "manifests/json_parse.h"
 
 namespace q3d::pipeline::device {
 namespace {
@@ -57,7 +58,7 @@ std::string to_json(const NetworkDomain& domain) {
 
 NetworkDomain domain_from_json(const std::string& text) {
   try {
-    const json document = json::parse(text);
+    const json document = manifests::parse_json<json>(text);
     NetworkDomain domain;
     domain.pictures = kPictures.value(document.at("pictures").get<std::string>());
     domain.trained_on = document.at("trained_on").get<std::string>();

@@ -6,6 +6,7 @@
 
 #include "manifests/atomic_file.h"
 #include "manifests/csv.h"
+#include "manifests/json_parse.h"
 #include "pipeline/evaluation/report.h"
 
 namespace q3d::pipeline::evaluation {
@@ -33,7 +34,7 @@ void read_samples(manifests::CsvTableReader rows, StoredEvaluation& evaluation) 
 }
 
 StoredEvaluation read_description(const fs::path& file) {
-  const json document = json::parse(manifests::read_file(file));
+  const json document = manifests::parse_json<json>(manifests::read_file(file));
   if (document.at("format") != kEvaluationFormat || document.at("schema") != kEvaluationSchema) {
     throw std::runtime_error(fmt::format(
         "got format {} schema {}, expected \"{}\" schema {}; evaluate the network again",

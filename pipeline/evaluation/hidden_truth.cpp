@@ -11,6 +11,7 @@
 
 #include "loaders/formats/picture_finder.h"
 #include "manifests/atomic_file.h"
+#include "manifests/json_parse.h"
 
 namespace q3d::pipeline::evaluation {
 namespace {
@@ -103,7 +104,7 @@ PictureTruth read_picture(const json& object, const std::string& where,
 
 HiddenTruth::HiddenTruth(const std::filesystem::path& file, const std::filesystem::path& masks)
     : file_(file) {
-  const json document = json::parse(manifests::read_file(file), nullptr, false);
+  const json document = manifests::parse_json_or_null<json>(manifests::read_file(file));
   if (!document.is_object() || !document.contains("pictures") || !document["pictures"].is_object()) {
     fail(file.string(), "expected a JSON object with \"pictures\": {<name>: {...}}");
   }

@@ -9,6 +9,7 @@
 #include "manifests/atomic_file.h"
 #include "manifests/csv.h"
 #include "manifests/enumerators.h"
+#include "manifests/json_parse.h"
 
 namespace q3d::pipeline::evaluation {
 namespace {
@@ -34,7 +35,7 @@ std::vector<StoredLabel> read_candidates(manifests::CsvTableReader rows) {
 }
 
 void read_description(const fs::path& file, StoredLabels& labels) {
-  const json document = json::parse(manifests::read_file(file));
+  const json document = manifests::parse_json<json>(manifests::read_file(file));
   if (document.at("format") != "quadruped3d-label-evaluation" || document.at("schema") != 1) {
     throw std::runtime_error(fmt::format(
         "got format {} schema {}, expected \"quadruped3d-label-evaluation\" schema 1; run `evaluate-labels` "

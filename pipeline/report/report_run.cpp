@@ -8,6 +8,7 @@
 
 #include "manifests/atomic_file.h"
 #include "manifests/digest.h"
+#include "manifests/json_parse.h"
 #include "pipeline/report/embedded_files.h"
 #include "pipeline/report/overlay_run.h"
 #include "pipeline/report/report_galleries.h"
@@ -47,7 +48,7 @@ std::string key_of(const dataset::PublishedDataset& dataset, const ReportOptions
 
 bool is_up_to_date(const fs::path& folder, const std::string& key) {
   const std::string text = text_of_file(folder / kManifest);
-  const ordered_json manifest = ordered_json::parse(text, nullptr, /*allow_exceptions=*/false);
+  const ordered_json manifest = manifests::parse_json_or_null<ordered_json>(text);
   if (!manifest.is_object() || manifest.value("key", "") != key || !manifest.contains("files")) return false;
   for (const char* name : {kStatistics, kPage}) {
     const fs::path file = folder / name;
@@ -60,7 +61,7 @@ bool is_up_to_date(const fs::path& folder, const std::string& key) {
 ordered_json tsne_of(const std::string& text, const dataset::DatasetManifest& manifest,
                      const fs::path& file) {
   if (text.empty()) return nullptr;
-  ordered_json tsne = ordered_json::parse(text, nullptr, /*allow_exceptions=*/false);
+  ordered_json tsne = manifests::parse_json_or_null<ordered_json>(text);
   if (tsne.is_object() && tsne.value("content_id", "") == manifest.content_id) return tsne;
   run::log_warning(
       fmt::format("{}: it is not of this dataset ({}) and is not shown; tools/shape_tsne.py makes it again",

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "manifests/atomic_file.h"
+#include "manifests/json_parse.h"
 #include "pipeline/run/log.h"
 #include "pipeline/stages/made_from.h"
 #include "pipeline/stages/stage.h"
@@ -69,7 +70,7 @@ BuildPlan plan_from(const json& document) {
 }
 
 std::optional<BuildPlan> read_plan(const fs::path& file) {
-  const json document = json::parse(manifests::read_file(file), nullptr, /*allow_exceptions=*/false);
+  const json document = manifests::parse_json_or_null<json>(manifests::read_file(file));
   std::string problem = "it is not readable JSON";
   if (document.is_object() && document.value("format", json()) == kFormat) {
     try {

@@ -6,13 +6,14 @@
 #include <sstream>
 
 #include "manifests/atomic_file.h"
+#include "manifests/json_parse.h"
 
 namespace q3d::pipeline::training {
 namespace {
 
 // A killed process may leave half a line, which counts as none.
 bool is_at_or_before(const std::string& line, int phase, std::int64_t step) {
-  const nlohmann::json document = nlohmann::json::parse(line, nullptr, /*allow_exceptions=*/false);
+  const nlohmann::json document = manifests::parse_json_or_null<nlohmann::json>(line);
   if (!document.is_object()) return false;
   const int line_phase = document.value("phase", 0);
   return line_phase < phase || (line_phase == phase && document.value("step", std::int64_t{0}) <= step);

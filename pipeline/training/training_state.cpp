@@ -11,6 +11,7 @@
 #include <string_view>
 
 #include "manifests/digest.h"
+#include "manifests/json_parse.h"
 #include "model/checkpoint.h"
 #include "pipeline/run/errors.h"
 #include "pipeline/run/log.h"
@@ -95,7 +96,7 @@ std::optional<StoredState> load_state(const std::filesystem::path& path, const s
                     path.parent_path().string()));
   }
   try {
-    const nlohmann::json document = nlohmann::json::parse(entry(state.file, kPosition));
+    const nlohmann::json document = manifests::parse_json<nlohmann::json>(entry(state.file, kPosition));
     document.at("phase").get_to(state.position.phase);
     document.at("step").get_to(state.position.step);
     document.at("watch_mean").get_to(state.position.watch.mean);

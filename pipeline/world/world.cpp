@@ -15,6 +15,7 @@
 #include "manifests/atomic_file.h"
 #include "manifests/durability.h"
 #include "manifests/file_descriptor.h"
+#include "manifests/json_parse.h"
 #include "manifests/lock.h"
 #include "pipeline/animal/synthetic_files.h"
 #include "pipeline/world/annotations.h"
@@ -56,13 +57,13 @@ nlohmann::json options_of(const WorldOptions& options) {
 std::optional<nlohmann::json> finished_world(const WorldOptions& options) {
   const fs::path file = options.out / "world.json";
   if (!fs::exists(file)) return std::nullopt;
-  const auto found = nlohmann::json::parse(manifests::read_file(file), nullptr, false);
-  if (found.is_discarded() || found.value("options", nlohmann::json()) != options_of(options)) {
+  const auto found = manifests::parse_json_or_null<nlohmann::json>(manifests::read_file(file));
+  if (!found.is_object() || found.value("options", nlohmann::json()) != options_of(options)) {
     throw std::runtime_error(
         fmt::format("world: {} holds another world (its options: {}; wanted: {}); choose another folder or "
                     "remove this one",
                     options.out.string(),
-                    found.is_discarded() ? "unreadable" : found.value("options", nlohmann::json()).dump(),
+                    !found.is_object() ? "unreadable" : found.value("options", nlohmann::json()).dump(),
                     options_of(options).dump()));
   }
   return found.at("pictures");
