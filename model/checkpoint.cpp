@@ -11,6 +11,8 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "manifests/json_parse.h"
+
 namespace q3d::model {
 namespace {
 
@@ -120,7 +122,7 @@ PrimaConfig checkpoint_config(const smal::tensors::SafeTensors& file) {
         file.path().string(), kConfigKey));
   }
   try {
-    return config_from_json(nlohmann::json::parse(entry->second));
+    return config_from_json(manifests::parse_json<nlohmann::json>(entry->second));
   } catch (const std::exception& error) {
     throw std::runtime_error(
         fmt::format("{}: metadata '{}': {}", file.path().string(), kConfigKey, error.what()));
@@ -140,6 +142,13 @@ std::shared_ptr<PrimaNet> load_net(const smal::tensors::SafeTensors& file, const
   auto net = std::make_shared<PrimaNet>(config, placement);
   for (auto& parameter : net->named_parameters()) {
     const torch::Tensor stored = file.tensor(parameter.key());
+    // One such number makes every prediction NaN, and a build would fail each candidate for it.
+    if (!stored.isfinite().all().item<bool>()) {
+      throw std::runtime_error(
+          fmt::format("{}: {} holds NaN or infinity, expected finite numbers; take a checkpoint from before "
+                      "the training diverged, or get the file again",
+                      file.path().string(), parameter.key()));
+    }
     parameter.value().copy_(stored);
     release_pages(stored);
   }

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <fstream>
 #include <iterator>
 #include <map>
@@ -90,6 +91,18 @@ TEST_F(Checkpoint, EveryFaultIsNamedAtOnce) {
   EXPECT_TRUE(mentions(message, "smal_head.stray: not part")) << message;
   EXPECT_TRUE(mentions(message, "smal_head.init_cam: shape [1, 4], expected [1, 3]")) << message;
   EXPECT_TRUE(mentions(message, "backbone.last_norm.bias: dtype Int")) << message;
+}
+
+TEST_F(Checkpoint, WeightsThatAreNotFiniteAreRefusedByName) {
+  for (const auto dtype : {torch::kFloat32, torch::kBFloat16}) {
+    for (const double value : {std::nan(""), HUGE_VAL, -HUGE_VAL}) {
+      Tensors broken = tensors_;
+      torch::Tensor& tensor = broken.at("smal_head.decpose.weight");
+      tensor = tensor.clone().to(dtype);
+      tensor.view({-1})[-1] = value;
+      EXPECT_TRUE(mentions(refusal(broken), "smal_head.decpose.weight holds NaN or infinity")) << value;
+    }
+  }
 }
 
 TEST_F(Checkpoint, TheConfigsSizesMustBeTheWeights) {
