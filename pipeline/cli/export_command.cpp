@@ -8,6 +8,7 @@
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/options.h"
 #include "pipeline/cli/python_program.h"
+#include "pipeline/dataset/export_list.h"
 #include "pipeline/exports/export_dataset.h"
 #include "pipeline/run/errors.h"
 
@@ -61,6 +62,8 @@ int export_in_python(const Arguments& arguments) {
         "with --python",
         arguments.format, arguments.python, check.message, arguments.python));
   }
+  dataset::list_export(dataset::PublishedDataset(arguments.dataset), arguments.format,
+                       arguments.options.pictures_anyway, arguments.options.out);
   std::vector<std::string> words{arguments.format, arguments.dataset.string(), "--out",
                                  arguments.options.out.string()};
   if (arguments.options.pictures_anyway) words.emplace_back("--pictures-anyway");

@@ -32,8 +32,10 @@ Command add_status(CLI::App& app) {
       "  quadruped3d status out\n"
       "  quadruped3d status out --json\n"
       "For each build in the folder, finished or not, it lists the stages with their keys, their manifests,\n"
-      "the units that are finished and those that are missing, and the command that goes on. It changes\n"
-      "nothing, and may be used while a build runs. It looks at the files' sizes; `quadruped3d verify` "
+      "the units that are finished and those that are missing, the command that goes on, and the exports. "
+      "It\n"
+      "changes nothing, and may be used while a build runs. It looks at the files' sizes; `quadruped3d "
+      "verify` "
       "reads\n"
       "a finished dataset whole.");
   return [arguments] {

@@ -10,8 +10,8 @@
 #include <stdexcept>
 
 #include "loaders/pictures/crop.h"
-#include "manifests/atomic_file.h"
 #include "manifests/digest.h"
+#include "pipeline/dataset/export_list.h"
 #include "pipeline/dataset/published_dataset.h"
 #include "pipeline/exports/format_writer.h"
 #include "pipeline/run/interrupt.h"
@@ -26,7 +26,7 @@ using dataset::ShardEntry;
 using manifests::ShardSample;
 using nlohmann::ordered_json;
 
-constexpr int kCode = 1;  // raise it when an export's bytes or their meaning change
+constexpr int kCode = 2;  // raise it when an export's bytes or their meaning change
 constexpr std::int64_t kRowsAtOnce = 64;
 constexpr double kSameCropPx = 1e-6;
 
@@ -44,6 +44,7 @@ class Exporter {
         folder_(options.out, about()) {}
 
   ExportSummary run() {
+    dataset::list_export(dataset_, format_name(), options_.pictures_anyway, options_.out);
     if (folder_.is_complete()) return summary_of_manifest();
     const std::vector<ShardEntry>& shards = dataset_.manifest().shards;
     run::Progress progress("samples", total_rows(), options_.quiet);
@@ -53,7 +54,7 @@ class Exporter {
       if (!is_done) export_unit(entry);
       progress.advance(entry.rows, is_done);
     }
-    for (const ShardEntry& entry : shards) writer_->take(folder_.part(entry.unit));
+    for (const ShardEntry& entry : shards) writer_->take(folder_.take_part(entry.unit));
     const auto records = writer_->assemble(folder_);
     folder_.write("croissant.json", croissant_text(croissant(records)));
     folder_.finish(summary_json());
@@ -92,9 +93,11 @@ class Exporter {
                                             : make_coco_writer(std::move(exported));
   }
 
+  const char* format_name() const { return options_.format == Format::prima ? "prima" : "coco"; }
+
   ordered_json about() const {
     return {{"format", "quadruped3d-export"},
-            {"export", options_.format == Format::prima ? "prima" : "coco"},
+            {"export", format_name()},
             {"code", kCode},
             {"name", dataset_.manifest().name},
             {"version", dataset_.manifest().version},
@@ -123,34 +126,42 @@ class Exporter {
     }
     const manifests::ShardReader shard = dataset_.open_shard(entry);
     std::string text;
+    ExportFolder::Files pictures;
     for (std::int64_t first = 0; first < shard.rows(); first += kRowsAtOnce) {
       const std::vector<ShardSample> samples =
           shard.samples(first, std::min(kRowsAtOnce, shard.rows() - first));
-      std::vector<std::string> lines(samples.size());
+      std::vector<SampleExport> exported(samples.size());
       arena_.execute([&] {
         oneapi::tbb::parallel_for(std::size_t{0}, samples.size(), [&](std::size_t i) {
-          lines[i] = export_sample(samples[i], shard.header().image_encoding, entry.unit,
-                                   first + static_cast<std::int64_t>(i));
+          exported[i] = export_sample(samples[i], shard.header().image_encoding, entry.unit,
+                                      first + static_cast<std::int64_t>(i));
         });
       });
-      for (const std::string& each : lines) text += each;
+      for (SampleExport& each : exported) {
+        text += each.lines;
+        pictures.merge(each.pictures);
+      }
     }
-    folder_.save_part(entry.unit, entry.sha256, shard.rows(), text);
+    folder_.save_part(entry.unit, entry.sha256, shard.rows(), text, pictures);
   }
 
-  std::string export_sample(const ShardSample& sample, manifests::ImageEncoding encoding, std::int64_t unit,
-                            std::int64_t row) const {
+  struct SampleExport {
+    std::string lines;
+    ExportFolder::Files pictures;
+  };
+
+  SampleExport export_sample(const ShardSample& sample, manifests::ImageEncoding encoding, std::int64_t unit,
+                             std::int64_t row) const {
     const bool has_picture = !sample.crop.empty() && is_licensed(source_of(sample));
     const ExportedPicture picture =
         export_picture(sample, encoding, has_picture ? writer_->pictures() : Pictures::none);
     if (writer_->pictures() == Pictures::official) check_crop(sample, picture);
     const ExportedSample exported{sample, picture, unit, row};
+    SampleExport result{writer_->lines(exported), {}};
     for (const PictureFile& file : writer_->picture_files(exported)) {
-      const fs::path path = folder_.path() / file.name;
-      fs::create_directories(path.parent_path());
-      manifests::write_file_atomically(path, *file.bytes);
+      result.pictures[file.name] = folder_.write_picture(file.name, *file.bytes);
     }
-    return writer_->lines(exported);
+    return result;
   }
 
   // The official code, which is given the box alone, must cut the very crop that the label refers to.

@@ -7,6 +7,8 @@
 
 #include "manifests/atomic_file.h"
 #include "manifests/digest.h"
+#include "manifests/file_descriptor.h"
+#include "manifests/json_parse.h"
 #include "pipeline/run/errors.h"
 
 namespace q3d::pipeline::exports {
@@ -23,10 +25,36 @@ std::string part_name(std::int64_t unit) {
 
 ordered_json read_json(const fs::path& file) {
   try {
-    return ordered_json::parse(manifests::read_file(file));
-  } catch (const nlohmann::json::exception& error) {
+    return manifests::parse_json<ordered_json>(manifests::read_file(file));
+  } catch (const manifests::IoError&) {
+    throw;
+  } catch (const std::exception& error) {
     throw std::runtime_error(fmt::format("{}: not readable JSON: {}; remove its folder and export again",
                                          file.string(), error.what()));
+  }
+}
+
+// {"NAME": [BYTES, "SHA-256"], ...} in one line: what a part says of its pictures.
+std::string line_of(const ExportFolder::Files& pictures) {
+  ordered_json line = ordered_json::object();
+  for (const auto& [name, file] : pictures) line[name] = {file.bytes, file.sha256};
+  return line.dump() + "\n";
+}
+
+ordered_json list_of(const ExportFolder::Files& files) {
+  ordered_json list = ordered_json::array();
+  for (const auto& [name, file] : files) {
+    list.push_back({{"file", name}, {"bytes", file.bytes}, {"sha256", file.sha256}});
+  }
+  return list;
+}
+
+void check_files(const fs::path& out, const ordered_json& list, const fs::path& manifest) {
+  for (const ordered_json& entry : list) {
+    const fs::path path = out / entry.at("file").get<std::string>();
+    if (fs::exists(path) && manifests::sha256_file(path) == entry.at("sha256").get<std::string>()) continue;
+    throw std::runtime_error(fmt::format("{}: is gone or differs from {}; remove {} and export again",
+                                         path.string(), manifest.string(), out.string()));
   }
 }
 
@@ -62,12 +90,8 @@ bool ExportFolder::open_complete() {
   if (!fs::exists(file)) return false;
   manifest_ = read_json(file);
   check_same(manifest_, file);
-  for (const ordered_json& entry : manifest_.at("files")) {
-    const fs::path path = out_ / entry.at("file").get<std::string>();
-    if (fs::exists(path) && manifests::sha256_file(path) == entry.at("sha256").get<std::string>()) continue;
-    throw std::runtime_error(fmt::format("{}: is gone or differs from {}; remove {} and export again",
-                                         path.string(), file.string(), out_.string()));
-  }
+  check_files(out_, manifest_.at("files"), file);
+  check_files(out_, manifest_.at("picture_files"), file);
   return true;
 }
 
@@ -97,35 +121,50 @@ bool ExportFolder::has_part(std::int64_t unit, const std::string& input_digest) 
   return false;
 }
 
-void ExportFolder::save_part(std::int64_t unit, const std::string& input_digest, std::int64_t rows,
-                             std::string_view text) {
-  const std::string name = part_name(unit);
-  manifests::write_file_atomically(parts_ / name, text);
-  journal_->append(
-      {unit, input_digest, name, manifests::sha256(text), static_cast<std::int64_t>(text.size()), rows});
-}
-
-std::string ExportFolder::part(std::int64_t unit) const {
-  std::string text = manifests::read_file(parts_ / part_name(unit));
-  if (manifests::sha256(text) == journal_->entries().at(unit).sha256) return text;
-  throw std::runtime_error(fmt::format("{}: changed while the export ran; run the same command again",
-                                       (parts_ / part_name(unit)).string()));
-}
-
-void ExportFolder::write(const std::string& name, std::string_view content) {
+ExportFolder::File ExportFolder::write_picture(const std::string& name,
+                                               std::span<const std::byte> content) const {
   const fs::path path = out_ / name;
   fs::create_directories(path.parent_path());
   manifests::write_file_atomically(path, content);
-  files_[name] = {manifests::sha256(content), content.size()};
+  return {manifests::sha256(content), content.size()};
+}
+
+void ExportFolder::save_part(std::int64_t unit, const std::string& input_digest, std::int64_t rows,
+                             std::string_view text, const Files& pictures) {
+  const std::string name = part_name(unit);
+  const std::string content = line_of(pictures).append(text);
+  manifests::write_file_atomically(parts_ / name, content);
+  journal_->append({unit, input_digest, name, manifests::sha256(content),
+                    static_cast<std::int64_t>(content.size()), rows});
+}
+
+std::string ExportFolder::take_part(std::int64_t unit) {
+  const std::string content = manifests::read_file(parts_ / part_name(unit));
+  if (manifests::sha256(content) != journal_->entries().at(unit).sha256) {
+    throw std::runtime_error(fmt::format("{}: changed while the export ran; run the same command again",
+                                         (parts_ / part_name(unit)).string()));
+  }
+  const std::size_t end = content.find('\n');
+  const ordered_json pictures = manifests::parse_json<ordered_json>(content.substr(0, end));
+  for (const auto& [name, file] : pictures.items()) {
+    pictures_[name] = {file.at(1).get<std::string>(), file.at(0).get<std::size_t>()};
+  }
+  return content.substr(end + 1);
+}
+
+void ExportFolder::write(const std::string& name, std::string_view content) {
+  files_[name] = write_picture(name, std::as_bytes(std::span(content)));
+}
+
+void ExportFolder::write_common_picture(const std::string& name, std::span<const std::byte> content) {
+  pictures_[name] = write_picture(name, content);
 }
 
 void ExportFolder::finish(const ordered_json& summary) {
   manifest_ = about_;
   manifest_.update(summary);
-  manifest_["files"] = ordered_json::array();
-  for (const auto& [name, file] : files_) {
-    manifest_["files"].push_back({{"file", name}, {"bytes", file.bytes}, {"sha256", file.sha256}});
-  }
+  manifest_["files"] = list_of(files_);
+  manifest_["picture_files"] = list_of(pictures_);
   manifests::write_file_atomically(out_ / kManifest, manifest_.dump(2) + "\n");
   journal_.reset();
   lock_.reset();

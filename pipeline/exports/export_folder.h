@@ -3,10 +3,12 @@
 
 #include <nlohmann/json.hpp>
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -19,9 +21,15 @@ namespace q3d::pipeline::exports {
 // with their journal. `export.json` exists when the export is complete; `.parts` is gone then.
 class ExportFolder {
  public:
+  struct File {
+    std::string sha256;
+    std::size_t bytes = 0;
+  };
+  using Files = std::map<std::string, File>;  // by their names in the folder
+
   // `about` says what is exported and how; equal exports have equal words there. Throws run::ConfigError if
   // the folder holds another export or other files, and std::runtime_error if another export writes there or
-  // a file of a complete export is gone or damaged.
+  // a file of a complete export, pictures included, is gone or damaged.
   ExportFolder(std::filesystem::path out, nlohmann::ordered_json about);
 
   const std::filesystem::path& path() const { return out_; }
@@ -29,22 +37,25 @@ class ExportFolder {
   // export.json of a complete export.
   const nlohmann::ordered_json& manifest() const { return manifest_; }
 
-  // The records of a unit. A part with another input digest, or with damaged bytes, does not count.
+  // Writes a picture or mask. The unit's part lists it, and through it the manifest. Thread-safe.
+  File write_picture(const std::string& name, std::span<const std::byte> content) const;
+  // The records of a unit and the pictures that they name. A part with another input digest, or with damaged
+  // bytes, does not count.
   bool has_part(std::int64_t unit, const std::string& input_digest);
-  void save_part(std::int64_t unit, const std::string& input_digest, std::int64_t rows,
-                 std::string_view text);
-  std::string part(std::int64_t unit) const;  // of a unit that has one; throws std::runtime_error if damaged
+  void save_part(std::int64_t unit, const std::string& input_digest, std::int64_t rows, std::string_view text,
+                 const Files& pictures);
+  // Returns the records of a unit that has a part, and takes its pictures into the manifest. Throws
+  // std::runtime_error if the part is damaged.
+  std::string take_part(std::int64_t unit);
 
-  // Writes a file that the manifest lists, and the folders that lead to it.
+  // Writes an annotation file or metadata, and the folders that lead to it. The manifest lists it.
   void write(const std::string& name, std::string_view content);
+  // Like write(), for a picture that belongs to no unit.
+  void write_common_picture(const std::string& name, std::span<const std::byte> content);
   // Writes the manifest, with `summary` in it, and removes the parts.
   void finish(const nlohmann::ordered_json& summary);
 
-  struct File {
-    std::string sha256;
-    std::size_t bytes = 0;
-  };
-  const std::map<std::string, File>& files() const { return files_; }
+  const Files& files() const { return files_; }
 
  private:
   bool open_complete();
@@ -58,7 +69,8 @@ class ExportFolder {
   bool complete_ = false;
   std::unique_ptr<manifests::FolderLock> lock_;
   std::unique_ptr<manifests::Journal> journal_;
-  std::map<std::string, File> files_;
+  Files files_;
+  Files pictures_;
 };
 
 }  // namespace q3d::pipeline::exports

@@ -89,7 +89,9 @@ manifests::Box exported_box(const manifests::ShardSample& sample, const Exported
 }
 
 std::string picture_stem(const manifests::ShardSample& sample, std::int64_t unit, std::int64_t row) {
+  constexpr std::size_t kMaxSpeciesBytes = 100;  // a file's name may have 255
   std::string species = sample.record.species.empty() ? "animal" : sample.record.species;
+  if (species.size() > kMaxSpeciesBytes) species.resize(kMaxSpeciesBytes);
   for (char& c : species) {
     const bool is_plain = (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '-';
     if (!is_plain) c = c == ' ' ? '+' : '-';

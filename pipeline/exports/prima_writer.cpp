@@ -92,7 +92,7 @@ class PrimaWriter final : public FormatWriter {
     for (const auto& [name, sides] : blank_sides_) {
       for (const int side : sides) {
         const auto png = loaders::pictures::encode_png(cv::Mat(side, side, CV_8UC1, cv::Scalar(0)));
-        folder.write(name + "/" + blank_mask(side), {reinterpret_cast<const char*>(png.data()), png.size()});
+        folder.write_common_picture(name + "/" + blank_mask(side), png);
       }
     }
     std::vector<CroissantRecords> result;

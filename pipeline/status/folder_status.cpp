@@ -165,6 +165,7 @@ FolderStatus folder_status(const fs::path& out) {
   status.out = out;
   std::map<std::string, BuildStatus> builds = builds_in(out);
   status.others = others_in(out, builds);
+  status.exports = dataset::listed_exports(out);
   for (auto& [version, build] : builds) status.builds.push_back(std::move(build));
   if (status.builds.empty() && status.others.empty()) {
     throw std::runtime_error(

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/dataset/export_list.h"
 #include "pipeline/stages/build_plan.h"
 #include "pipeline/stages/stage.h"
 
@@ -52,8 +53,9 @@ struct OtherStage {
 
 struct FolderStatus {
   std::filesystem::path out;
-  std::vector<BuildStatus> builds;  // in the order of their versions
-  std::vector<OtherStage> others;   // in the order of their folders
+  std::vector<BuildStatus> builds;             // in the order of their versions
+  std::vector<OtherStage> others;              // in the order of their folders
+  std::vector<dataset::ExportStatus> exports;  // of all builds in the folder
 };
 
 // The status of one build whose plan is known, whether or not it has been written.

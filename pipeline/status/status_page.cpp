@@ -72,6 +72,48 @@ std::string result_line(const std::string& indent, std::string_view name, const 
   return line(indent, name, "", result.is_there ? "made" : "not made", result.manifest.string());
 }
 
+std::string words_of(dataset::ExportState state) {
+  switch (state) {
+    case dataset::ExportState::complete:
+      return "complete";
+    case dataset::ExportState::damaged:
+      return "damaged";
+    case dataset::ExportState::unfinished:
+      return "not finished";
+    case dataset::ExportState::gone:
+      return "gone";
+  }
+  return {};
+}
+
+std::string remark(const dataset::ExportStatus& status) {
+  const std::string folder = status.listed.folder.string();
+  switch (status.state) {
+    case dataset::ExportState::complete:
+      return folder;
+    case dataset::ExportState::damaged:
+      return fmt::format(
+          "{}: {} gone or of another size, the first is {}; remove the folder and export again", folder,
+          run::counted(static_cast<std::int64_t>(status.damaged.size()), "file"), status.damaged.front());
+    case dataset::ExportState::unfinished:
+      return folder + ": the same `export` command goes on with it";
+    case dataset::ExportState::gone:
+      return folder + ": the folder was removed, or holds something else now";
+  }
+  return {};
+}
+
+// The exports of one version, a line each.
+std::string export_lines(const std::vector<dataset::ExportStatus>& exports, const std::string& version) {
+  std::string text;
+  for (const dataset::ExportStatus& each : exports) {
+    if (each.listed.version != version) continue;
+    text += fmt::format("    export {}: {} {:<12} {}\n", each.listed.format, short_key(each.key),
+                        words_of(each.state), remark(each));
+  }
+  return text;
+}
+
 std::string build_page(const BuildStatus& build) {
   std::string text =
       fmt::format("  {}{}: {} in {}, {}\n", build.version, build.is_latest ? " (latest)" : "",
@@ -99,6 +141,16 @@ ordered_json to_json(const StageStatus& stage) {
           {"units_not_needed", stage.not_needed}};
 }
 
+ordered_json to_json(const dataset::ExportStatus& status) {
+  return {{"format", status.listed.format},
+          {"version", status.listed.version},
+          {"key", status.key},
+          {"folder", status.listed.folder.string()},
+          {"state", words_of(status.state)},
+          {"pictures_anyway", status.listed.pictures_anyway},
+          {"damaged", status.damaged}};
+}
+
 ordered_json to_json(const ResultStatus& result) {
   return {{"manifest", result.manifest.string()}, {"is_there", result.is_there}};
 }
@@ -118,7 +170,9 @@ std::string stage_table(const BuildStatus& build, const std::string& indent) {
 std::string page(const FolderStatus& status) {
   const auto builds = static_cast<std::int64_t>(status.builds.size());
   std::string text = fmt::format("{}: {}\n", status.out.string(), run::counted(builds, "build"));
-  for (const BuildStatus& build : status.builds) text += build_page(build);
+  for (const BuildStatus& build : status.builds) {
+    text += build_page(build) + export_lines(status.exports, build.version);
+  }
   if (!status.others.empty()) {
     text += "  Folders of stages that belong to no build here, such as the predictions of `calibrate`:\n";
   }
@@ -152,7 +206,10 @@ ordered_json to_json(const FolderStatus& status) {
   for (const OtherStage& other : status.others) {
     others.push_back({{"folder", other.folder.string()}, {"units", other.units}});
   }
-  return {{"folder", status.out.string()}, {"builds", builds}, {"other_stages", others}};
+  ordered_json exports = ordered_json::array();
+  for (const dataset::ExportStatus& each : status.exports) exports.push_back(to_json(each));
+  return {
+      {"folder", status.out.string()}, {"builds", builds}, {"other_stages", others}, {"exports", exports}};
 }
 
 }  // namespace q3d::pipeline::status

@@ -6,7 +6,7 @@
 //                     this library changes nothing
 //   Q3D_FAULT_CALL    the kind of call: open (open, openat, fopen), read (read, pread),
 //                     stat (stat, lstat, fstatat), sync (fsync, fdatasync, syncfs), write, rename, link (link,
-//                     symlink), lock (flock), or change: any of sync, write, rename and link
+//                     symlink), lock (flock), mkdir, close, or change: any of sync, write, rename and link
 //   Q3D_FAULT_SKIP    how many matching calls pass unharmed before the fault begins (default 0)
 //   Q3D_FAULT_ACTION  fail: this call and all later ones fail with Q3D_FAULT_ERRNO (default)
 //                     stop: the process stops itself (SIGSTOP), once; after SIGCONT the call is made
@@ -14,7 +14,8 @@
 //                     kill: the process kills itself (SIGKILL) before the call; of a write, one half is made
 //                     count: nothing, but when the process exits, a line says how many calls there were:
 //                     "faults: counted NUMBER calls"
-//   Q3D_FAULT_ERRNO   EIO (default), ESTALE, EMFILE, ENOMEM or a number
+//   Q3D_FAULT_ERRNO   a number, or a name such as ESTALE (errno_named lists them); EIO is the default
+//   Q3D_FAULT_TIMES   how often `fail` strikes; without it, always
 //
 // Every fault is announced by a line on stderr, "faults: ACTION at CALL of PATH", so that a test can tell
 // that it was reached. A call of alarm() is announced as "faults: alarm after SECONDS s".
@@ -40,6 +41,7 @@ static const char* fault_call;
 static const char* fault_action;
 static int fault_errno;
 static long fault_skip;
+static long fault_times;
 static atomic_long calls_seen;
 static unsigned (*next_alarm)(unsigned);
 
@@ -47,13 +49,16 @@ static int errno_named(const char* name) {
   static const struct {
     const char* name;
     int value;
-  } kErrors[] = {{"EIO", EIO}, {"ESTALE", ESTALE}, {"EMFILE", EMFILE}, {"ENOMEM", ENOMEM}};
+  } kErrors[] = {{"EIO", EIO},       {"ESTALE", ESTALE}, {"EMFILE", EMFILE}, {"ENOMEM", ENOMEM},
+                 {"EROFS", EROFS},   {"EACCES", EACCES}, {"EPERM", EPERM},   {"ENOSPC", ENOSPC},
+                 {"EDQUOT", EDQUOT}, {"EXDEV", EXDEV},   {"EMLINK", EMLINK}, {"EINTR", EINTR},
+                 {"EAGAIN", EAGAIN}, {"EINVAL", EINVAL}, {"ENOLCK", ENOLCK}, {"ENOTSUP", ENOTSUP}};
   for (size_t i = 0; i < sizeof kErrors / sizeof kErrors[0]; ++i) {
     if (strcmp(name, kErrors[i].name) == 0) return kErrors[i].value;
   }
   const int number = atoi(name);
   if (number > 0) return number;
-  fprintf(stderr, "faults: Q3D_FAULT_ERRNO: got %s, expected EIO, ESTALE, EMFILE, ENOMEM or a number\n",
+  fprintf(stderr, "faults: Q3D_FAULT_ERRNO: got %s, expected a name such as EIO or a number\n",
           name);
   abort();
 }
@@ -67,6 +72,7 @@ __attribute__((constructor)) static void read_settings(void) {
   fault_call = setting("Q3D_FAULT_CALL", "");
   fault_action = setting("Q3D_FAULT_ACTION", "fail");
   fault_skip = atol(setting("Q3D_FAULT_SKIP", "0"));
+  fault_times = atol(setting("Q3D_FAULT_TIMES", "-1"));
   fault_errno = errno_named(setting("Q3D_FAULT_ERRNO", "EIO"));
   fault_path = getenv("Q3D_FAULT_PATH");
   next_alarm = (unsigned (*)(unsigned))(uintptr_t)dlsym(RTLD_NEXT, "alarm");
@@ -129,6 +135,7 @@ static int strikes(const char* call, const char* path) {
     raise(SIGSTOP);
     return 0;
   }
+  if (fault_times >= 0 && before >= fault_skip + fault_times) return 0;
   announce(call, path);
   if (strcmp(fault_action, "kill") == 0) kill_this_process();
   while (strcmp(fault_action, "hang") == 0) pause();
@@ -242,6 +249,22 @@ int symlink(const char* target, const char* path) {
 int flock(int descriptor, int operation) {
   NEXT(int, flock, int, int);
   return strikes_descriptor("lock", descriptor) ? -1 : next(descriptor, operation);
+}
+
+int mkdir(const char* path, mode_t mode) {
+  NEXT(int, mkdir, const char*, mode_t);
+  return strikes("mkdir", path) ? -1 : next(path, mode);
+}
+
+// A close that fails has closed the descriptor all the same, as Linux does it.
+int close(int descriptor) {
+  NEXT(int, close, int);
+  const int fails = strikes_descriptor("close", descriptor);
+  const int code = errno;
+  const int result = next(descriptor);
+  if (!fails) return result;
+  errno = code;
+  return -1;
 }
 
 ssize_t read(int descriptor, void* buffer, size_t size) {

@@ -9,11 +9,13 @@
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "filters/metrics.h"
 #include "loaders/formats/dataset.h"
 #include "loaders/pictures/image.h"
 #include "manifests/atomic_file.h"
+#include "pipeline/dataset/export_list.h"
 #include "pipeline/exports/corrections.h"
 #include "pipeline/exports/picture.h"
 #include "pipeline/run/errors.h"
@@ -144,6 +146,81 @@ TEST_F(Exports, OtherFoldersAndDamageAreRefused) {
   EXPECT_TRUE(fs::exists(scratch_.path() / "mine/thesis.txt"));
   std::ofstream(scratch_.path() / "coco/annotations.json") << "{}";
   EXPECT_THROW(run(Format::coco, "coco"), std::runtime_error);
+}
+
+// A complete export is checked as a whole, so an export with a picture that is gone or damaged is never said
+// to be complete.
+TEST_F(Exports, EveryFileOfACompleteExportIsListedAndChecked) {
+  for (const Format format : {Format::prima, Format::coco}) {
+    const std::string out = format == Format::prima ? "prima" : "coco";
+    run(format, out);
+    const auto whole = files(out);
+    const json manifest = json::parse(whole.at("export.json"));
+    std::set<std::string> listed{"export.json"};
+    for (const char* list : {"files", "picture_files"}) {
+      for (const json& entry : manifest.at(list)) listed.insert(entry.at("file").get<std::string>());
+    }
+    for (const auto& [name, content] : whole) {
+      EXPECT_EQ(listed.count(name), 1U) << name;
+      if (name == "export.json") continue;
+      const fs::path file = scratch_.path() / out / name;
+      fs::remove(file);
+      EXPECT_THROW(run(format, out), std::runtime_error) << name;
+      std::string damaged = content;
+      damaged[damaged.size() / 2] ^= 1;
+      manifests::write_file_atomically(file, damaged);
+      EXPECT_THROW(run(format, out), std::runtime_error) << name;
+      manifests::write_file_atomically(file, content);
+    }
+    EXPECT_EQ(listed.size(), whole.size());
+    EXPECT_TRUE(run(format, out).was_complete);
+  }
+}
+
+TEST_F(Exports, AreListedBesideTheDataset) {
+  const fs::path out = made_.folder.parent_path();
+  EXPECT_TRUE(dataset::listed_exports(out).empty());
+  run(Format::coco, "elsewhere/coco");
+  run(Format::prima, "prima", true);
+  auto list = dataset::listed_exports(out);
+  ASSERT_EQ(list.size(), 2U);
+  EXPECT_EQ(list[0].listed.format, "coco");
+  EXPECT_EQ(list[0].listed.version, made_.folder.filename());
+  EXPECT_EQ(fs::weakly_canonical(out / list[0].listed.folder),
+            fs::weakly_canonical(scratch_.path() / "elsewhere/coco"));
+  EXPECT_TRUE(list[0].listed.folder.is_relative());
+  EXPECT_EQ(list[0].state, dataset::ExportState::complete);
+  EXPECT_EQ(list[0].key.size(), 64U);
+  EXPECT_NE(list[0].key, list[1].key);
+  EXPECT_TRUE(list[1].listed.pictures_anyway);
+  const json manifest = json::parse(files("elsewhere/coco").at("export.json"));
+  const std::string picture = manifest.at("picture_files")[0].at("file");
+  std::ofstream(scratch_.path() / "elsewhere/coco" / picture) << "cut";
+  fs::remove_all(scratch_.path() / "prima");
+  list = dataset::listed_exports(out);
+  EXPECT_EQ(list[0].state, dataset::ExportState::damaged);
+  EXPECT_EQ(list[0].damaged, std::vector<std::string>{picture});
+  EXPECT_EQ(list[1].state, dataset::ExportState::gone);
+}
+
+// An export that was killed between two units is never taken for a complete one, and goes on.
+TEST_F(Exports, AStoppedExportIsListedAsUnfinished) {
+  const fs::path out = made_.folder.parent_path();
+  fs::create_directories(scratch_.path() / "coco/.parts");
+  run(Format::coco, "whole");
+  json about = json::parse(files("whole").at("export.json"));
+  for (const char* key : {"samples", "pictures", "without_licence", "datasets", "files", "picture_files"}) {
+    about.erase(key);
+  }
+  manifests::write_file_atomically(scratch_.path() / "coco/.parts/about.json", about.dump());
+  dataset::list_export(dataset::PublishedDataset(made_.folder), "coco", false, scratch_.path() / "coco");
+  const auto unfinished = dataset::listed_exports(out);
+  ASSERT_EQ(unfinished.size(), 2U);
+  EXPECT_EQ(unfinished[0].state, dataset::ExportState::unfinished);
+  EXPECT_EQ(unfinished[0].key, unfinished[1].key);
+  EXPECT_FALSE(run(Format::coco, "coco").was_complete);
+  EXPECT_EQ(dataset::listed_exports(out)[0].state, dataset::ExportState::complete);
+  EXPECT_EQ(files("coco"), files("whole"));
 }
 
 TEST_F(Exports, PicturesNeedAStatedLicence) {

@@ -4,6 +4,7 @@ build would do."""
 import json
 import shlex
 import shutil
+import signal
 
 from e2e import (PICTURES, UNIT, Case, Fault, Scene, digests, flip_bit, latest, run, run_json, started,
                  units_in_journals, verdicts)
@@ -133,6 +134,40 @@ class Status(Case):
         build = self.only_build(self.out)
         self.assertTrue(build["derived"], made)
         self.assertIn("no stages of its own", run("status", self.out).stdout)
+
+    def test_exports_and_the_report_are_listed(self):
+        self.copy_of("out")
+        coco = self.folder / "exports/coco"
+        # Stops before the first picture is there under its name.
+        fault = Fault("images/", "rename", "stop")
+        words = ("export", self.out, "--format", "coco", "--out", coco, "--pictures-anyway")
+        with started(*words, fault=fault) as running:
+            self.assertTrue(running.wait_for_stop(), running.stderr())
+            running.send(signal.SIGKILL)
+            running.wait()
+        export, = run_json("status", self.out)["exports"]
+        self.assertEqual((export["format"], export["state"], export["folder"]),
+                         ("coco", "not finished", "../exports/coco"))
+        self.assertFalse((coco / "export.json").exists())
+        self.assertIn("not finished ../exports/coco: the same `export` command goes on", run("status", self.out).stdout)
+        run(*words)
+        self.assertIn("(was complete)", run(*words).stderr)
+        done, = run_json("status", self.out)["exports"]
+        self.assertEqual((done["state"], done["key"], done["version"]),
+                         ("complete", export["key"], latest(self.out).name))
+        next((coco / "images").iterdir()).unlink()
+        self.assertEqual(run_json("status", self.out)["exports"][0]["state"], "damaged")
+        self.assertIn("is gone or differs", run(*words, expect=1).stderr)
+        run("report", self.out, "--gallery", 0)
+        self.assertTrue(self.only_build(self.out)["report"]["is_there"])
+
+    def test_an_export_below_a_read_only_dataset_is_made_all_the_same(self):
+        self.copy_of("out")
+        fault = Fault("stages/exports", "open", error="EROFS")
+        said = run("export", self.out, "--format", "coco", "--out", self.folder / "coco", fault=fault).stderr
+        self.assertIn("`status` will not list this export", said)
+        self.assertTrue((self.folder / "coco/export.json").exists())
+        self.assertEqual(run_json("status", self.out)["exports"], [])
 
     def test_a_folder_without_a_build_is_refused(self):
         self.assertIn("expected an output folder", run("status", self.folder, expect=1).stderr)

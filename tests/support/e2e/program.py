@@ -45,15 +45,16 @@ def run_json(*arguments, **options):
 @dataclasses.dataclass(frozen=True)
 class Fault:
     """What tests/faults/faults.c does to calls of kind `call` ("open", "read", "stat", "sync", "write", "rename",
-    "link", "lock", or "change": any of sync, write, rename and link) on files whose path contains `path`, or ends with
-    it if it ends in "$", after `skip` of these passed: "fail" with the errno `error`, "stop" once, "hang", "kill", or
-    only "count" them."""
+    "link", "lock", "mkdir", "close", or "change": any of sync, write, rename and link) on files whose path contains
+    `path`, or ends with it if it ends in "$", after `skip` of these passed: "fail" with the errno `error` (`times`
+    times, or always), "stop" once, "hang", "kill", or only "count" them."""
 
     path: str
     call: str
     action: str = "fail"
     error: str = "EIO"
     skip: int = 0
+    times: int = -1
 
 
 def environment(fault=None):
@@ -62,7 +63,7 @@ def environment(fault=None):
         return dict(os.environ)
     return {**os.environ, "LD_PRELOAD": os.environ["Q3D_FAULTS"], "Q3D_FAULT_PATH": fault.path,
             "Q3D_FAULT_CALL": fault.call, "Q3D_FAULT_ACTION": fault.action, "Q3D_FAULT_ERRNO": fault.error,
-            "Q3D_FAULT_SKIP": str(fault.skip),
+            "Q3D_FAULT_SKIP": str(fault.skip), "Q3D_FAULT_TIMES": str(fault.times),
             # The address sanitizer wants to be the first library. It works as the second one too.
             "ASAN_OPTIONS": ":".join(filter(None, (os.environ.get("ASAN_OPTIONS"), "verify_asan_link_order=0")))}
 
