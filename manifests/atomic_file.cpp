@@ -69,10 +69,11 @@ void commit_file(const fs::path& temporary, const fs::path& path) {
 }
 
 std::string read_file(const fs::path& path) {
-  const FileDescriptor file = open_input(path);
-  std::string content(file.size(), '\0');
-  file.read_at(0, std::as_writable_bytes(std::span(content)));
-  return content;
+  return read_input(path, [](const FileDescriptor& file) {
+    std::string content(file.size(), '\0');
+    file.read_at(0, std::as_writable_bytes(std::span(content)));
+    return content;
+  });
 }
 
 void sync_folder(const fs::path& folder) {

@@ -54,16 +54,17 @@ std::string sha256(std::string_view text) {
 
 std::string sha256_file(const std::filesystem::path& path) {
   constexpr std::uint64_t kBlock = 1 << 20;
-  const FileDescriptor file = open_input(path);
-  const std::uint64_t size = file.size();
-  std::vector<std::byte> block(std::min(size, kBlock));
-  Sha256 digest;
-  for (std::uint64_t at = 0; at < size; at += kBlock) {
-    const auto piece = std::span(block).first(std::min(kBlock, size - at));
-    file.read_at(at, piece);
-    digest.update(piece);
-  }
-  return digest.hex();
+  return read_input(path, [&](const FileDescriptor& file) {
+    const std::uint64_t size = file.size();
+    std::vector<std::byte> block(std::min(size, kBlock));
+    Sha256 digest;
+    for (std::uint64_t at = 0; at < size; at += kBlock) {
+      const auto piece = std::span(block).first(std::min(kBlock, size - at));
+      file.read_at(at, piece);
+      digest.update(piece);
+    }
+    return digest.hex();
+  });
 }
 
 }  // namespace q3d::manifests

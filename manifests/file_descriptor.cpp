@@ -5,22 +5,28 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
+#include <chrono>
 #include <system_error>
+#include <thread>
 #include <utility>
 
 #include "manifests/durability.h"
 
 namespace q3d::manifests {
-
 namespace {
 
+using namespace std::chrono_literals;
+
+constexpr std::array<std::chrono::milliseconds, 3> kPauses{50ms, 200ms, 800ms};
+
 int open_file(const std::filesystem::path& path, int flags) {
-  int descriptor = -1;
-  do {
-    descriptor = ::open(path.c_str(), flags | O_CLOEXEC, 0666);
-  } while (descriptor < 0 && errno == EINTR);
-  return descriptor;
+  for (int attempt = 0;;) {
+    const int descriptor = ::open(path.c_str(), flags | O_CLOEXEC, 0666);
+    if (descriptor >= 0) return descriptor;
+    if (errno != EINTR && !pause_before_retry(errno, attempt++)) return descriptor;
+  }
 }
 
 }  // namespace
@@ -37,6 +43,14 @@ bool names_no_file(int code) {
     default:
       return false;
   }
+}
+
+bool pause_before_retry(int code, int attempt) {
+  const bool may_pass = code == EAGAIN || code == ESTALE;
+  if (!may_pass || static_cast<std::size_t>(attempt) >= kPauses.size()) return false;
+  std::this_thread::sleep_for(kPauses[static_cast<std::size_t>(attempt)]);
+  errno = code;
+  return true;
 }
 
 IoError::IoError(std::string_view doing, std::filesystem::path path, int code)
@@ -92,10 +106,12 @@ void FileDescriptor::write_all(std::string_view text) const {
 }
 
 void FileDescriptor::read_at(std::uint64_t offset, std::span<std::byte> bytes) const {
-  while (!bytes.empty()) {
+  for (int attempt = 0; !bytes.empty();) {
     const ssize_t got = ::pread(descriptor_, bytes.data(), bytes.size(), static_cast<off_t>(offset));
     if (got < 0) {
-      if (errno == EINTR) continue;
+      // A stale descriptor stays stale; read_input() opens the file again.
+      const bool may_pass = errno == EINTR || (errno == EAGAIN && pause_before_retry(errno, attempt++));
+      if (may_pass) continue;
       throw_errno("read", path_);
     }
     if (got == 0) {
@@ -137,10 +153,11 @@ FileDescriptor open_input(const std::filesystem::path& path) {
 }
 
 std::vector<std::byte> read_bytes(const std::filesystem::path& path) {
-  const FileDescriptor file = open_input(path);
-  std::vector<std::byte> bytes(file.size());
-  file.read_at(0, bytes);
-  return bytes;
+  return read_input(path, [](const FileDescriptor& file) {
+    std::vector<std::byte> bytes(file.size());
+    file.read_at(0, bytes);
+    return bytes;
+  });
 }
 
 }  // namespace q3d::manifests

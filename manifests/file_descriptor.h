@@ -1,6 +1,7 @@
 // A POSIX file descriptor that closes itself. Reads and writes are complete or throw.
 #pragma once
 
+#include <cerrno>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -39,8 +40,8 @@ class IoError : public std::runtime_error {
 class FileDescriptor {
  public:
   FileDescriptor() = default;
-  // Calls open(2) with O_CLOEXEC. A new file gets mode 0666 less the umask. Throws IoError, as all members
-  // do.
+  // Calls open(2) with O_CLOEXEC, and again after EINTR and what pause_before_retry() names. A new file gets
+  // mode 0666 less the umask. Throws IoError, as all members do.
   FileDescriptor(const std::filesystem::path& path, int flags);
   ~FileDescriptor();
   FileDescriptor(FileDescriptor&& other) noexcept;
@@ -55,7 +56,7 @@ class FileDescriptor {
   void write_all(std::span<const std::byte> bytes) const;
   void write_all(std::string_view text) const;
   // Fills `bytes` with the file's content from `offset` on. It does not move the file position, so many
-  // threads may call it at once.
+  // threads may call it at once. EINTR and EAGAIN are tried again.
   void read_at(std::uint64_t offset, std::span<std::byte> bytes) const;
   void sync() const;
   // Closes the file. Network file systems report a failed write only here, so whoever wrote must call it.
@@ -66,9 +67,28 @@ class FileDescriptor {
   int descriptor_ = -1;
 };
 
+// Whether a call that failed with this errno is worth another try: EAGAIN, and ESTALE, with which network
+// disks answer while their server starts again. If so it sleeps before the try number `attempt` (0, 1, ...):
+// 50, 200 and 800 ms, and leaves errno as it was. False after the last try.
+bool pause_before_retry(int code, int attempt);
+
 // Opens a regular file for reading. Throws IoError; a folder, pipe or device names no file, and a named pipe
 // without a writer does not make the caller wait.
 FileDescriptor open_input(const std::filesystem::path& path);
+
+// Opens a regular file and returns read(file). If the server of a network disk has forgotten the open file
+// (ESTALE), the file is opened again and `read` begins anew, so that what it returns comes from one opening.
+template <typename Read>
+auto read_input(const std::filesystem::path& path, Read&& read) {
+  for (int attempt = 0;; ++attempt) {
+    const FileDescriptor file = open_input(path);
+    try {
+      return read(file);
+    } catch (const IoError& error) {
+      if (error.code() != ESTALE || !pause_before_retry(ESTALE, attempt)) throw;
+    }
+  }
+}
 
 // The whole content of a regular file, read once. Throws IoError, also when the file shrinks meanwhile.
 std::vector<std::byte> read_bytes(const std::filesystem::path& path);

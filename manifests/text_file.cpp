@@ -17,7 +17,6 @@ namespace {
 
 using namespace std::string_view_literals;
 
-constexpr std::uintmax_t kMaxTextBytes = std::uintmax_t{4} << 30U;
 constexpr std::string_view kUtf8Mark = "\xef\xbb\xbf"sv;
 
 struct Signature {
@@ -97,17 +96,19 @@ std::string utf8_from_utf16(std::string_view bytes, bool is_big_endian) {
   return text;
 }
 
-std::string read_whole(const std::filesystem::path& path, std::string_view expected) {
+std::string read_whole(const std::filesystem::path& path, std::string_view expected,
+                       std::uint64_t max_bytes) {
   try {
-    const FileDescriptor file = open_input(path);
-    const std::uint64_t size = file.size();
-    if (size > kMaxTextBytes) {
-      throw std::runtime_error(fmt::format("{}: got {} bytes, expected {} of at most {}", path.string(), size,
-                                           expected, kMaxTextBytes));
-    }
-    std::string text(size, '\0');
-    file.read_at(0, std::as_writable_bytes(std::span(text)));
-    return text;
+    return read_input(path, [&](const FileDescriptor& file) {
+      const std::uint64_t size = file.size();
+      if (size > max_bytes) {
+        throw std::runtime_error(fmt::format("{}: got {} bytes, expected {} of at most {}", path.string(),
+                                             size, expected, max_bytes));
+      }
+      std::string text(size, '\0');
+      file.read_at(0, std::as_writable_bytes(std::span(text)));
+      return text;
+    });
   } catch (const IoError& error) {
     if (!error.names_no_file()) throw;
     throw std::runtime_error(fmt::format("{}: {}, expected {}", path.string(), error.reason(), expected));
@@ -127,8 +128,9 @@ std::string named_content(std::string_view content) {
   return text.starts_with('<') ? named_markup(text) : std::string();
 }
 
-std::string read_text_file(const std::filesystem::path& file, std::string_view expected) {
-  std::string text = read_whole(file, expected);
+std::string read_text_file(const std::filesystem::path& file, std::string_view expected,
+                           std::uint64_t max_bytes) {
+  std::string text = read_whole(file, expected, max_bytes);
   if (text.starts_with("\xff\xfe"sv) || text.starts_with("\xfe\xff"sv)) {
     text = utf8_from_utf16(std::string_view(text).substr(2), text.starts_with("\xfe"sv));
   }

@@ -90,18 +90,19 @@ MaskKind kind_of(const cv::Mat& grey) {
 
 FileBytes read_picture_file(const std::filesystem::path& path) {
   try {
-    const manifests::FileDescriptor file = manifests::open_input(path);
-    const std::uint64_t size = file.size();
-    if (size > kMaxFileBytes) {
-      return {{},
-              Reason::image_too_large,
-              fmt::format("{}: got {} bytes, expected at most {}", path.filename().string(), size,
-                          kMaxFileBytes)};
-    }
-    FileBytes content;
-    content.bytes.resize(size);
-    file.read_at(0, content.bytes);
-    return content;
+    return manifests::read_input(path, [&](const manifests::FileDescriptor& file) -> FileBytes {
+      const std::uint64_t size = file.size();
+      if (size > kMaxFileBytes) {
+        return {{},
+                Reason::image_too_large,
+                fmt::format("{}: got {} bytes, expected at most {}", path.filename().string(), size,
+                            kMaxFileBytes)};
+      }
+      FileBytes content;
+      content.bytes.resize(size);
+      file.read_at(0, content.bytes);
+      return content;
+    });
   } catch (const manifests::IoError& error) {
     if (!error.names_no_file()) throw;
     const Reason reason = error.code() == EISDIR ? Reason::image_not_an_image : Reason::image_missing;

@@ -153,12 +153,13 @@ std::optional<PictureHeader> read_header(const ReadAt& read_at) {
 
 std::optional<PictureHeader> read_picture_header(const std::filesystem::path& path) {
   try {
-    const manifests::FileDescriptor file = manifests::open_input(path);
-    const std::uint64_t size = file.size();
-    return read_header([&](std::uint64_t at, std::span<std::byte> bytes) {
-      if (at > size || bytes.size() > size - at) return false;
-      file.read_at(at, bytes);
-      return true;
+    return manifests::read_input(path, [](const manifests::FileDescriptor& file) {
+      const std::uint64_t size = file.size();
+      return read_header([&](std::uint64_t at, std::span<std::byte> bytes) {
+        if (at > size || bytes.size() > size - at) return false;
+        file.read_at(at, bytes);
+        return true;
+      });
     });
   } catch (const manifests::IoError& error) {
     if (!error.names_no_file()) throw;

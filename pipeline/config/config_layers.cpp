@@ -19,9 +19,11 @@ namespace {
 using nlohmann::json;
 namespace fs = std::filesystem;
 
+constexpr std::uint64_t kMaxConfigBytes = 64U << 20U;
+
 json read_json(const fs::path& file) {
   try {
-    const std::string text = manifests::read_text_file(file, "a config in JSON");
+    const std::string text = manifests::read_text_file(file, "a config in JSON", kMaxConfigBytes);
     return json::parse(text, manifests::refuse_repeated_keys<json>(refuse_depth(file.string())), true,
                        /*ignore_comments=*/true);
   } catch (const manifests::RepeatedKey& error) {

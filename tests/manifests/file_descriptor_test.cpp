@@ -68,6 +68,27 @@ TEST_F(InputFile, InterruptedCallsAreRepeated) {
   }
 }
 
+// A server that starts again answers ESTALE for a moment, and a busy one EAGAIN.
+TEST_F(InputFile, WhatMayPassIsTriedAgain) {
+  for (const int code : {EAGAIN, ESTALE}) {
+    for (const Call call : {Call::open, Call::read}) {
+      {
+        const FailingIo io(call, "/file", code, 2);
+        EXPECT_EQ(read_bytes(path_), bytes_of("content"));
+        EXPECT_EQ(io.failures(), 2);
+      }
+      const FailingIo io(call, "/file", code);
+      EXPECT_EQ(error_of(path_).code(), code) << "in the end it gives up";
+      EXPECT_EQ(io.failures(), 4);
+    }
+    const FailingIo io(Call::read, "/file", code, 1);
+    EXPECT_EQ(sha256_file(path_), sha256(std::string_view("content")));
+  }
+  const FailingIo io(Call::read, "/file", EIO);
+  EXPECT_EQ(error_of(path_).code(), EIO);
+  EXPECT_EQ(io.failures(), 1) << "an error of the disk is told at once";
+}
+
 TEST_F(InputFile, WhatIsNotThereIsToldApartFromWhatCannotBeRead) {
   fs::create_symlink("file_that_is_not_there", scratch_.path() / "broken");
   fs::create_symlink("loop", scratch_.path() / "loop");
