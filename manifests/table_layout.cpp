@@ -1,15 +1,19 @@
 #include "manifests/table_layout.h"
 
 #include <fmt/format.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <optional>
+#include <set>
 #include <stdexcept>
 #include <utility>
 
 #include "manifests/hdf5.h"
 #include "manifests/hdf5_memory_file.h"
+#include "manifests/own_process.h"
 
 namespace q3d::manifests {
 namespace {
@@ -221,11 +225,52 @@ Handle open_hdf5(const TableContent& content) {
   return {H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.get()), H5Fclose, "cannot open"};
 }
 
+// A file that was tried, as it was then.
+using FileIdentity = std::array<std::int64_t, 6>;
+
+FileIdentity identity_of(const std::filesystem::path& path) {
+  struct stat status {};
+  if (::stat(path.c_str(), &status) != 0) throw_errno("inspect", path);
+  return {static_cast<std::int64_t>(status.st_dev),
+          static_cast<std::int64_t>(status.st_ino),
+          static_cast<std::int64_t>(status.st_size),
+          status.st_mtim.tv_sec,
+          status.st_mtim.tv_nsec,
+          status.st_ctim.tv_nsec};
+}
+
+TableLayout layout_of(hid_t hdf5_file, const TableContent& content) {
+  TableLayout layout;
+  layout.rows = read_rows(hdf5_file);
+  layout.attributes = read_attributes(hdf5_file, content.size());
+  layout.columns = read_columns(hdf5_file, content, layout.rows);
+  return layout;
+}
+
+// Files on disk may be shards that strangers made, and HDF5 1.10 can crash on a damaged one. So another
+// process reads the file's layout first, once for each file. Bytes in memory are those of this program's own
+// stages, which were compared with their digest. A Session must exist, so that no other thread holds HDF5's
+// lock when the child begins. Throws std::runtime_error if the child crashed or hung.
+void try_in_own_process(const TableContent& content) {
+  static std::set<FileIdentity> sound;  // guarded by the session's lock
+  constexpr std::chrono::seconds kMaxTime{60};
+  if (content.in_memory()) return;
+  const FileIdentity identity = identity_of(content.path());
+  if (sound.contains(identity)) return;
+  const auto read = [&content] {
+    const Handle file = open_hdf5(content);
+    layout_of(file.get(), content);
+  };
+  if (const auto crash = trial_in_own_process(read, kMaxTime)) throw std::runtime_error(*crash);
+  sound.insert(identity);
+}
+
 // Calls `read(HDF5 file)` and puts the path before the message of what it throws, unless that names it.
 template <typename Read>
 auto with_hdf5(const TableContent& content, Read read) {
   const hdf5::Session session;
   try {
+    try_in_own_process(content);
     const Handle file = open_hdf5(content);
     return read(file.get());
   } catch (const IoError&) {
@@ -238,13 +283,7 @@ auto with_hdf5(const TableContent& content, Read read) {
 }  // namespace
 
 TableLayout read_table_layout(const TableContent& content) {
-  return with_hdf5(content, [&](hid_t hdf5_file) {
-    TableLayout layout;
-    layout.rows = read_rows(hdf5_file);
-    layout.attributes = read_attributes(hdf5_file, content.size());
-    layout.columns = read_columns(hdf5_file, content, layout.rows);
-    return layout;
-  });
+  return with_hdf5(content, [&](hid_t hdf5_file) { return layout_of(hdf5_file, content); });
 }
 
 std::map<std::string, std::string> read_table_attributes(const std::filesystem::path& path) {

@@ -1,6 +1,7 @@
 // Reads HDF5 files that other programs wrote and that may be damaged. Every claim of the file is checked
 // against its size before memory is taken for it, and links to other files are not followed. HDF5 itself
-// can crash on a damaged file, so these functions belong into a process of their own (own_process.h).
+// can crash on a damaged file, so these functions belong into a process of their own
+// (manifests/own_process.h).
 #pragma once
 
 #include <cstdint>

@@ -23,10 +23,10 @@
 
 #include "loaders/formats/hdf5_claims.h"
 #include "loaders/formats/label_table.h"
-#include "loaders/formats/own_process.h"
 #include "loaders/formats/pickled_names.h"
 #include "loaders/formats/sleap.h"
 #include "manifests/hdf5.h"
+#include "manifests/own_process.h"
 
 namespace q3d::loaders::formats {
 namespace {
@@ -365,7 +365,7 @@ LabelTable read_label_hdf5(const std::filesystem::path& file) {
   // The lock is taken here, because no other thread may hold it when the child begins.
   const manifests::hdf5::Session session;
   return naming(file, [&file] {
-    return unpacked(in_own_process([&file] { return packed(read_file(file)); }, kMaxTime));
+    return unpacked(manifests::in_own_process([&file] { return packed(read_file(file)); }, kMaxTime));
   });
 }
 

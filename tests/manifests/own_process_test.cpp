@@ -1,4 +1,4 @@
-#include "loaders/formats/own_process.h"
+#include "manifests/own_process.h"
 
 #include <gmock/gmock.h>
 #include <unistd.h>
@@ -6,7 +6,7 @@
 #include <csignal>
 #include <stdexcept>
 
-namespace q3d::loaders::formats {
+namespace q3d::manifests {
 namespace {
 
 using std::chrono::seconds;
@@ -52,5 +52,14 @@ TEST(OwnProcess, EndsWorkThatHangs) {
               HasSubstr("more than 1 s"));
 }
 
+TEST(OwnProcess, ATrialTellsOnlyOfCrashes) {
+  EXPECT_EQ(trial_in_own_process([] {}, seconds(60)), std::nullopt);
+  EXPECT_EQ(trial_in_own_process([] { throw std::runtime_error("got 4, expected 5"); }, seconds(60)),
+            std::nullopt);
+  EXPECT_THAT(trial_in_own_process([] { raise(SIGSEGV); }, seconds(60)).value_or(""), HasSubstr("crashed"));
+  EXPECT_THAT(trial_in_own_process([] { pause(); }, seconds(1)).value_or(""), HasSubstr("more than 1 s"));
+  EXPECT_THAT(trial_in_own_process([] { _exit(0); }, seconds(60)).value_or(""), HasSubstr("gave no answer"));
+}
+
 }  // namespace
-}  // namespace q3d::loaders::formats
+}  // namespace q3d::manifests

@@ -3,9 +3,10 @@
 
 #include <chrono>
 #include <functional>
+#include <optional>
 #include <string>
 
-namespace q3d::loaders::formats {
+namespace q3d::manifests {
 
 // Runs `work` in a child process and returns its result. The child can neither end nor corrupt this process.
 // `work` sees this process's memory as it is now, and only the calling thread; locks that other threads hold
@@ -14,4 +15,10 @@ namespace q3d::loaders::formats {
 // created.
 std::string in_own_process(const std::function<std::string()>& work, std::chrono::seconds limit);
 
-}  // namespace q3d::loaders::formats
+// Runs `work` in a child process as a trial, for work that gives the same each time and that this process is
+// to do next. Returns why the child ended (it crashed, exited or took longer than `limit`), or nothing if
+// `work` came to its end, whether it returned or threw.
+std::optional<std::string> trial_in_own_process(const std::function<void()>& work,
+                                                std::chrono::seconds limit);
+
+}  // namespace q3d::manifests

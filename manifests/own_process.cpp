@@ -1,4 +1,4 @@
-#include "loaders/formats/own_process.h"
+#include "manifests/own_process.h"
 
 #include <fmt/format.h>
 #include <sys/prctl.h>
@@ -14,7 +14,7 @@
 #include <stdexcept>
 #include <system_error>
 
-namespace q3d::loaders::formats {
+namespace q3d::manifests {
 namespace {
 
 // The first byte of the answer. The rest is the value, or the reason why there is none.
@@ -71,9 +71,12 @@ int wait_for(pid_t child) {
   return status;
 }
 
-}  // namespace
+struct Answer {
+  std::string content;       // the first byte says of which kind it is
+  std::string how_it_ended;  // empty if the child came to its end
+};
 
-std::string in_own_process(const std::function<std::string()>& work, std::chrono::seconds limit) {
+Answer answer_of_child(const std::function<std::string()>& work, std::chrono::seconds limit) {
   std::array<int, 2> ends{};
   if (pipe(ends.data()) != 0) throw_errno("pipe");
   const pid_t child = fork();
@@ -86,24 +89,42 @@ std::string in_own_process(const std::function<std::string()>& work, std::chrono
     close(ends[0]);
     throw_errno("fork");
   }
-  std::string answer = read_all(ends[0]);
+  Answer answer{read_all(ends[0]), {}};
   close(ends[0]);
   const int status = wait_for(child);
   if (WIFSIGNALED(status)) {
-    throw std::runtime_error(
+    answer.how_it_ended =
         WTERMSIG(status) == SIGALRM
             ? fmt::format("reading took more than {} s and was stopped", limit.count())
             : fmt::format("the library that reads it crashed ({}), which happens with damaged files",
-                          strsignal(WTERMSIG(status))));
+                          strsignal(WTERMSIG(status)));
+  } else if (!WIFEXITED(status) || WEXITSTATUS(status) != EXIT_SUCCESS || answer.content.empty()) {
+    answer.how_it_ended =
+        fmt::format("the process that reads it ended with status {} and gave no answer", WEXITSTATUS(status));
   }
-  if (!WIFEXITED(status) || WEXITSTATUS(status) != EXIT_SUCCESS || answer.empty()) {
-    throw std::runtime_error(fmt::format("the process that reads it ended with status {} and gave no answer",
-                                         WEXITSTATUS(status)));
-  }
-  const bool is_value = answer.front() == kValue;
-  answer.erase(0, 1);
-  if (!is_value) throw std::runtime_error(answer);
   return answer;
 }
 
-}  // namespace q3d::loaders::formats
+}  // namespace
+
+std::string in_own_process(const std::function<std::string()>& work, std::chrono::seconds limit) {
+  Answer answer = answer_of_child(work, limit);
+  if (!answer.how_it_ended.empty()) throw std::runtime_error(answer.how_it_ended);
+  const bool is_value = answer.content.front() == kValue;
+  answer.content.erase(0, 1);
+  if (!is_value) throw std::runtime_error(answer.content);
+  return std::move(answer.content);
+}
+
+std::optional<std::string> trial_in_own_process(const std::function<void()>& work,
+                                                std::chrono::seconds limit) {
+  const auto silent = [&work] {
+    work();
+    return std::string();
+  };
+  Answer answer = answer_of_child(silent, limit);
+  if (answer.how_it_ended.empty()) return std::nullopt;
+  return std::move(answer.how_it_ended);
+}
+
+}  // namespace q3d::manifests
