@@ -27,7 +27,6 @@ namespace {
 
 constexpr int kFailure = 1;
 constexpr int kUsage = 2;
-constexpr int kInterrupted = 130;
 
 // Returns what a person can do about an errno.
 const char* advice(int code) {
@@ -130,7 +129,7 @@ int run_program(int argc, char** argv, std::span<const CommandEntry> entries) {
     return code;
   } catch (const run::Interrupted&) {
     fmt::print(stderr, "stopped; run the same command to continue\n");
-    return kInterrupted;
+    return run::interrupt_exit_code();
   } catch (const run::ConfigError& error) {
     fmt::print(stderr, "quadruped3d: {}\n", error.what());
     return kUsage;

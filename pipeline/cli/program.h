@@ -13,8 +13,8 @@ struct CommandEntry {
 };
 
 // Parses the command line, runs the chosen command and turns exceptions into exit codes: 0 success, 1 a
-// failure at run time, 2 wrong usage or configuration, 130 interrupted. Commands of kCommands that `entries`
-// lacks are listed in the help alone.
+// failure at run time, 2 wrong usage or configuration, 130, 143 or 129 stopped by SIGINT, SIGTERM or SIGHUP.
+// Commands of kCommands that `entries` lacks are listed in the help alone.
 int run_program(int argc, char** argv, std::span<const CommandEntry> entries);
 
 }  // namespace q3d::pipeline::cli

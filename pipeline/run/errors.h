@@ -12,7 +12,7 @@ class ConfigError : public std::invalid_argument {
   using std::invalid_argument::invalid_argument;
 };
 
-// The user asked to stop (Ctrl-C): exit code 130. What was finished stays, the open unit is dropped.
+// The user asked to stop (interrupt.h has the exit codes). What was finished stays, the open unit is dropped.
 class Interrupted : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

@@ -11,16 +11,17 @@ namespace q3d::pipeline::run {
 namespace {
 
 constexpr unsigned kGraceSeconds = 8;
-volatile std::sig_atomic_t signals_seen = 0;
+constexpr int kSignalled = 128;  // a shell's exit code for a process that a signal ended, less the signal
+volatile std::sig_atomic_t first_signal = 0;
 
 void leave_at_once(int) {
-  _exit(130);
+  _exit(interrupt_exit_code());
 }
 
 // Async-signal-safe: write, alarm and _exit only.
-void on_signal(int) {
-  if (signals_seen != 0) _exit(130);
-  signals_seen = 1;
+void on_signal(int number) {
+  if (first_signal != 0) _exit(interrupt_exit_code());
+  first_signal = number;
   const char text[] =
       "\ninterrupted: dropping the open unit (finished units stay; run the same command to go on)\n";
   const ssize_t written = write(STDERR_FILENO, text, std::strlen(text));
@@ -35,6 +36,9 @@ void install_interrupt_handlers() {
   action.sa_handler = on_signal;
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
+  struct sigaction present {};
+  sigaction(SIGHUP, nullptr, &present);
+  if (present.sa_handler != SIG_IGN) sigaction(SIGHUP, &action, nullptr);
   struct sigaction last {};
   last.sa_handler = leave_at_once;
   sigaction(SIGALRM, &last, nullptr);
@@ -43,7 +47,11 @@ void install_interrupt_handlers() {
 }
 
 bool interrupted() {
-  return signals_seen != 0;
+  return first_signal != 0;
+}
+
+int interrupt_exit_code() {
+  return kSignalled + (first_signal != 0 ? first_signal : SIGINT);
 }
 
 void throw_if_interrupted() {
