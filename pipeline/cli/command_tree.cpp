@@ -36,12 +36,12 @@ void set_value(const CLI::Option& option, OptionInfo& info) {
   info.words = words_of(text.check);
   if (!info.words.empty()) {
     info.value = ValueKind::word;
-  } else if (text.check == "DIR") {
+  } else if (text.check == "DIR" || text.type == "FOLDER") {
     info.value = ValueKind::folder;
     info.value_name = "FOLDER";
-  } else if (text.check == "FILE" || text.check.rfind("PATH", 0) == 0) {
+  } else if (text.check == "FILE" || text.type == "FILE" || text.check.rfind("PATH", 0) == 0) {
     info.value = ValueKind::file;
-    info.value_name = text.check == "FILE" ? "FILE" : "PATH";
+    info.value_name = text.check.rfind("PATH", 0) == 0 ? "PATH" : "FILE";
   } else if (text.type == "TEXT" && text.check.empty()) {
     info.value = ValueKind::file;  // most texts without a check are paths that need not exist yet
   }

@@ -64,7 +64,8 @@ std::string positional_line(const CommandNode& node, const OptionInfo& positiona
   if (positional.value == ValueKind::word) {
     return beginning + fmt::format(" -a '{}'\n", fmt::join(positional.words, " "));
   }
-  return positional.value == ValueKind::other ? std::string() : beginning + " -F\n";
+  if (positional.value == ValueKind::folder) return beginning + " -a '(__fish_complete_directories)'\n";
+  return positional.value == ValueKind::file ? beginning + " -F\n" : std::string();
 }
 
 std::string lines_of(const CommandNode& node) {

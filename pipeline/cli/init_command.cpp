@@ -29,7 +29,7 @@ struct Arguments {
 Command add_init(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = declare(app, "init");
-  out_option(*command, arguments->out, "write an untrained checkpoint to this file (safetensors)");
+  out_file_option(*command, arguments->out, "write an untrained checkpoint to this file (safetensors)");
   command
       ->add_option("-s,--size", arguments->size,
                    "size of the network: vith (the paper's), small, lite or tiny")

@@ -32,9 +32,11 @@ CLI::Option* config_option(CLI::App& command, ConfigArguments& config, const std
 }
 
 CLI::Option* device_option(CLI::App& command, ConfigArguments& config) {
-  return command.add_option("--device", config.device,
-                            "where the network runs, instead of the config's network.device: auto, cpu, cuda "
-                            "or cuda:1");
+  return command
+      .add_option("--device", config.device,
+                  "where the network runs, instead of the config's network.device: auto, cpu, cuda "
+                  "or cuda:1")
+      ->type_name("DEVICE");
 }
 
 CLI::Option* out_option(CLI::App& command, std::filesystem::path& out, const std::string& text) {
@@ -50,7 +52,11 @@ CLI::Option* out_option(CLI::App& command, std::filesystem::path& out, const std
       "do not wait until files have reached the disk, for file systems that cannot sync");
   command.add_flag_callback("--no-lock", without(&manifests::Durability::locks),
                             "do not lock the output folder, for file systems that have no locks");
-  return command.add_option("-o,--out", out, text);
+  return command.add_option("-o,--out", out, text)->type_name("FOLDER");
+}
+
+CLI::Option* out_file_option(CLI::App& command, std::filesystem::path& out, const std::string& text) {
+  return out_option(command, out, text)->type_name("FILE");
 }
 
 CLI::Option* threads_option(CLI::App& command, int& threads, const std::string& text) {
@@ -76,7 +82,7 @@ void comparison_options(CLI::App& command, filters::BootstrapOptions& bootstrap,
       ->capture_default_str()
       ->check(CLI::PositiveNumber);
   command.add_option("--seed", bootstrap.seed, "seed of the bootstrap")->capture_default_str();
-  out_option(command, out, "write the comparison to this file as JSON");
+  out_file_option(command, out, "write the comparison to this file as JSON");
   json_flag(command, json, "print the comparison as JSON to stdout");
 }
 

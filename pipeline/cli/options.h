@@ -33,6 +33,8 @@ CLI::Option* config_option(
 CLI::Option* device_option(CLI::App& command, ConfigArguments& config);
 // -o,--out: a path, and how it is written: --no-sync, --no-lock. Not required unless the caller says so.
 CLI::Option* out_option(CLI::App& command, std::filesystem::path& out, const std::string& text);
+// The same, for a command whose output is one file.
+CLI::Option* out_file_option(CLI::App& command, std::filesystem::path& out, const std::string& text);
 // -t,--threads: a number, 0 or more.
 CLI::Option* threads_option(
     CLI::App& command, int& threads,

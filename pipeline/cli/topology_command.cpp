@@ -121,7 +121,8 @@ Command add_topology(CLI::App& app) {
                    "label file whose names to read: COCO or LabelMe .json; DeepLabCut, SLEAP or Lightning "
                    "Pose .h5, .slp or .csv; or a folder of labels")
       ->check(CLI::ExistingPath);
-  out_option(*command, arguments->draft.out, "write the topology to this file; without it, it is printed");
+  out_file_option(*command, arguments->draft.out,
+                  "write the topology to this file; without it, it is printed");
   command->add_flag("--force", arguments->draft.replaces, "write over a file that is there");
   command->add_option("--name", arguments->draft.name,
                       "name of the topology, instead of the label file's name");

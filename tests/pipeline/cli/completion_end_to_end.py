@@ -1,5 +1,6 @@
 """Completions and the manual page, which are made from the commands themselves."""
 
+import pathlib
 import re
 import shutil
 import subprocess
@@ -65,6 +66,7 @@ class Completion(Case):
         (self.folder / "my folder").mkdir()
         self.assertEqual(sorted(self.completed("build", "-c", "my")), ["my config.json", "my folder"])
         self.assertEqual(self.completed("verify", "my"), ["my folder"])
+        self.assertEqual(self.completed("build", "--out", "my"), ["my folder"])
 
     def test_every_command_and_option_is_in_every_script(self):
         for shell in SHELLS:
@@ -83,6 +85,78 @@ class Completion(Case):
 
     def test_an_unknown_shell_is_wrong_usage(self):
         self.assertIn("bash", run("completion", "tcsh", expect=2).stderr)
+
+
+class OtherShells(Case):
+    """What zsh and fish themselves offer, each asked in its own way. bash is asked above."""
+
+    @classmethod
+    def prepare(cls):
+        for shell in ("zsh", "fish"):
+            (cls.shared / shell).mkdir()
+        (cls.shared / "zsh/_quadruped3d").write_text(run("completion", "zsh").stdout)
+        (cls.shared / "fish/quadruped3d.fish").write_text(run("completion", "fish").stdout)
+
+    def in_zsh(self, line):
+        script = pathlib.Path(__file__).with_name("complete.zsh")
+        result = subprocess.run(["zsh", "-f", script, self.shared / "zsh", line], capture_output=True, text=True,
+                                check=True, cwd=self.folder, timeout=300)
+        self.assertEqual(result.stderr, "")
+        return {word.replace("\\ ", " ") for word in result.stdout.splitlines()}
+
+    def in_fish(self, line):
+        code = 'source $argv[1]; complete -C $argv[2]'
+        result = subprocess.run(["fish", "--no-config", "-c", code, self.shared / "fish/quadruped3d.fish", line],
+                                capture_output=True, text=True, check=True, cwd=self.folder, timeout=300,
+                                env={"PATH": "/usr/bin:/bin", "HOME": str(self.folder), "TERM": "dumb"})
+        self.assertEqual(result.stderr, "")
+        return {word.split("\t")[0] for word in result.stdout.splitlines()}
+
+    def setUp(self):
+        super().setUp()
+        self.shells = {name: ask for name, ask in (("zsh", self.in_zsh), ("fish", self.in_fish)) if shutil.which(name)}
+        if not self.shells:
+            self.skipTest("neither zsh nor fish is installed")
+
+    def test_commands(self):
+        for shell, ask in self.shells.items():
+            with self.subTest(shell=shell):
+                self.assertEqual(ask("quadruped3d "), {*commands(), "help"})
+                self.assertEqual(ask("quadruped3d stat"), {"status"})
+                self.assertEqual(ask("quadruped3d evaluate"), {"evaluate", "evaluate-labels"})
+                self.assertEqual(ask("quadruped3d help ver"), {"verify"})
+                self.assertEqual(ask("quadruped3d config sh"), {"show"})
+
+    def test_options(self):
+        for shell, ask in self.shells.items():
+            with self.subTest(shell=shell):
+                self.assertEqual(ask("quadruped3d build --unt"), {"--until"})
+                self.assertEqual(ask("quadruped3d build --out o --json --dry"), {"--dry-run"})
+                for command in ("build", "export", "status", "train"):
+                    self.assertEqual(ask(f"quadruped3d {command} --"), options_of(command), command)
+                self.assertEqual(ask("quadruped3d config show --"), options_of("config", "show"))
+
+    def test_values(self):
+        for shell, ask in self.shells.items():
+            with self.subTest(shell=shell):
+                self.assertEqual(ask("quadruped3d build --until pre"), {"predict"})
+                self.assertEqual({word.removeprefix("--until=") for word in ask("quadruped3d build --until=pre")}, {"predict"})
+                self.assertEqual(ask("quadruped3d completion "), {"bash", "fish", "zsh"})
+                self.assertEqual(ask("quadruped3d export --format p"), {"parquet", "prima"})
+
+    def test_files(self):
+        (self.folder / "my_config.json").write_text("{}")
+        (self.folder / "my_folder").mkdir()
+        for shell, ask in self.shells.items():
+            with self.subTest(shell=shell):
+                self.assertEqual({word.rstrip("/") for word in ask("quadruped3d build -c my")}, {"my_config.json", "my_folder"})
+                self.assertEqual({word.rstrip("/") for word in ask("quadruped3d build --out my")}, {"my_folder"})
+                self.assertEqual({word.rstrip("/") for word in ask("quadruped3d verify my")}, {"my_folder"})
+
+    def test_nothing_is_offered_where_anything_may_stand(self):
+        for shell, ask in self.shells.items():
+            with self.subTest(shell=shell):
+                self.assertEqual(ask("quadruped3d build --threads "), set())
 
 
 class ManualPage(Case):
