@@ -8,6 +8,7 @@
 #include <chrono>
 #include <cmath>
 #include <memory>
+#include <span>
 
 #include "manifests/digest.h"
 #include "pipeline/build/prediction_progress.h"
@@ -130,13 +131,23 @@ class Predictor {
       request.schedule.iterations = options_.iterations;
       samples.emplace_back().sample = i;
     }
-    if (requests.empty()) return samples;
-    std::vector<device::AdaptOutcome> outcomes = workspace_.network().adapt(requests);
-    for (std::size_t j = 0; j < outcomes.size(); ++j) {
-      samples[j].curve = std::move(outcomes[j].curve);
-      samples[j].body = outcomes[j].best;
+    const auto batch = static_cast<std::size_t>(config_.tta.batch);
+    for (std::size_t start = 0; start < requests.size(); start += batch) {
+      const std::size_t count = std::min(batch, requests.size() - start);
+      std::vector<device::AdaptOutcome> outcomes =
+          workspace_.network().adapt(std::span(requests).subspan(start, count));
+      for (std::size_t j = 0; j < outcomes.size(); ++j) {
+        samples[start + j].curve = std::move(outcomes[j].curve);
+        samples[start + j].body = outcomes[j].best;
+      }
+      progress_.advance(static_cast<std::int64_t>(count));
     }
     return samples;
+  }
+
+  // How many of a unit's animals adapt() counts.
+  static std::int64_t adapted(const unit::UnitWork& work) {
+    return static_cast<std::int64_t>(work.refined ? work.refined->size() : 0);
   }
 
   void write(unit::UnitWork& work) {
@@ -159,10 +170,19 @@ class Predictor {
       for (const unit::RefinedSample& refined : *work.refined)
         take(refined, animals_[first + refined.sample]);
     }
-    // Adaptation takes most of the time, so with it a unit counts when it is through.
-    if (work.predicted_before || adaptations_) {
-      progress_.advance(static_cast<std::int64_t>(work.unit->count), work.predicted_before);
+    count_the_rest(work);
+  }
+
+  // Adaptation takes most of the time, so with it an animal counts when it is adapted, and the others when
+  // their unit is through.
+  void count_the_rest(const unit::UnitWork& work) {
+    const auto all = static_cast<std::int64_t>(work.unit->count);
+    if (!adaptations_) {
+      if (work.predicted_before) progress_.advance(all, /*from_earlier_run=*/true);
+      return;
     }
+    const bool is_old = work.predicted_before && work.refined_before;
+    progress_.advance(work.refined_before ? all : all - adapted(work), is_old);
   }
 
   static void take(const unit::RefinedSample& refined, PredictedAnimal& animal) {

@@ -1,4 +1,4 @@
-"""The progress of a build: a bar on a terminal, lines elsewhere."""
+"""The progress of a build and of `predict`: a bar on a terminal, lines elsewhere."""
 
 import collections
 import fcntl
@@ -130,3 +130,17 @@ class Progress(Case):
             self.assertEqual(running.wait(), 0, running.stderr())
         finally:
             running.kill()
+
+    def test_the_bar_of_predict_moves_within_a_unit(self):
+        """The program stops before a first unit is written, and has told of a first batch of four animals."""
+        for more in ([], ["--adapt", 3]):
+            words = command(["predict", "--config", self.scene.config, "--out", self.folder / f"out{len(more)}", *more])
+            running = OnTerminal(words, self.env(Fault(".h5.", "sync", "stop")))
+            try:
+                self.assertTrue(running.wait_for_stop(), running.stderr())
+                self.assertRegex(running.stderr(), rf"animals \[[^\n]* 4/{PICTURES} ", more)
+                running.send(signal.SIGCONT)
+                self.assertEqual(running.wait(), 0, running.stderr())
+                self.assertRegex(running.stderr(), rf"animals \[#+\] 100 %  {PICTURES}/{PICTURES} ")
+            finally:
+                running.kill()
