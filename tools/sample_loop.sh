@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # The paper's three stages on the rendered world, from nothing:
-#   tools/sample_loop.sh model             pools, pre-trained encoders, Stage 1 (full schedule): models/small.safetensors
+#   tools/sample_loop.sh model             pools, pre-trained encoders, Stage 1 (full schedule): models/lite.safetensors
 #   tools/sample_loop.sh loop SCHEDULE SEED   Stage 1, Stage 2, Stage 3, and both networks on the test sets
 # SCHEDULE is full or quick. Every step does what is missing, so a run that was stopped goes on where it was.
 set -euo pipefail
@@ -30,10 +30,10 @@ prepare() {
     "$program" build --config "configs/world_pools/$pool.json" --out "$home/pools/$pool"
   done
   [ -f "$home/initial.safetensors" ] && [ -f "$home/priors.safetensors" ] ||
-    "$program" init --size small --out "$home/initial.safetensors" --priors "$home/priors.safetensors" \
-      --smal-asset data/world/assets/smal_synthetic.safetensors
+    "$program" init --size lite --stem models/efficientnet_lite0.safetensors --out "$home/initial.safetensors" \
+      --priors "$home/priors.safetensors" --smal-asset data/world/assets/smal_synthetic.safetensors
   say "pre-training of the image encoders, shared by all stages"
-  train --config configs/world_training.json --stage pretrain --out "$home/pretrain"
+  train --config configs/world_training.json --set frozen_stem_blocks=11 --stage pretrain --out "$home/pretrain"
 }
 
 # The training config's layers for a schedule and a seed; Stage 3 reads what this loop's Stage 2 made.
@@ -91,7 +91,7 @@ case "${1:-}" in
   model)
     prepare
     stage1 full 0 "$home/full-0"
-    say "trained: $home/full-0/stage1/model.safetensors (models/small.safetensors ships such a network)"
+    say "trained: $home/full-0/stage1/model.safetensors (models/lite.safetensors ships such a network)"
     ;;
   loop)
     prepare

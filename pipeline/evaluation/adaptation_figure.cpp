@@ -5,11 +5,16 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <iterator>
 #include <vector>
+
+#include "pipeline/figure/svg.h"
 
 namespace q3d::pipeline::evaluation {
 namespace {
+
+using figure::Anchor;
+using figure::Place;
+using figure::Svg;
 
 constexpr double kPanelWidth = 460, kPanelHeight = 320;
 constexpr double kLeft = 60, kRight = 20, kTop = 40, kBottom = 56;  // margins of a panel
@@ -19,14 +24,11 @@ constexpr int kTicks = 5;
 constexpr std::array<const char*, 7> kColours{"#0072b2", "#d55e00", "#009e73", "#cc79a7",
                                               "#56b4e9", "#e69f00", "#000000"};
 
-struct Point {
-  double x;
-  double y;
-};
+constexpr const char* kInk = "#222";
 
 struct Line {
   std::string dataset;
-  std::vector<Point> points;  // by ascending x
+  std::vector<Place> points;  // in the units of the axes, by ascending x
 };
 
 struct Range {
@@ -61,15 +63,15 @@ std::vector<Line> lines_of(const Tables& tables, const Axis& axis, Metric metric
   std::erase_if(lines, [](const Line& line) { return line.points.size() < 2; });
   for (Line& line : lines) {
     std::sort(line.points.begin(), line.points.end(),
-              [](const Point& a, const Point& b) { return a.x < b.x; });
+              [](const Place& a, const Place& b) { return a.x < b.x; });
   }
   return lines;
 }
 
-Range range_of(const std::vector<Line>& lines, double Point::*coordinate) {
+Range range_of(const std::vector<Line>& lines, double Place::*coordinate) {
   Range range{INFINITY, -INFINITY};
   for (const Line& line : lines) {
-    for (const Point& point : line.points) {
+    for (const Place& point : line.points) {
       range.from = std::min(range.from, point.*coordinate);
       range.to = std::max(range.to, point.*coordinate);
     }
@@ -86,14 +88,15 @@ class Panel {
         lines_(lines),
         metric_(metric),
         axis_(axis),
-        x_(range_of(lines, &Point::x)),
-        y_(range_of(lines, &Point::y)) {}
+        x_(range_of(lines, &Place::x)),
+        y_(range_of(lines, &Place::y)) {}
 
-  std::string draw() {
-    text(left_ + kLeft, top_ + 22, "start",
-         fmt::format("{} ({} is better)", metric_.title, metric_.higher_is_better ? "more" : "less"));
+  Svg draw() {
+    svg_.text({left_ + kLeft, top_ + 22}, Anchor::start, kInk,
+              fmt::format("{} ({} is better)", metric_.title, metric_.higher_is_better ? "more" : "less"));
     for (int i = 0; i <= kTicks; ++i) ticks(static_cast<double>(i) / kTicks);
-    text(left_ + (kLeft + kPanelWidth - kRight) / 2, top_ + kPanelHeight - 14, "middle", axis_.title);
+    svg_.text({left_ + (kLeft + kPanelWidth - kRight) / 2, top_ + kPanelHeight - 14}, Anchor::middle, kInk,
+              axis_.title);
     for (std::size_t i = 0; i < lines_.size(); ++i) curve(lines_[i], kColours[i % kColours.size()]);
     return svg_;
   }
@@ -107,32 +110,20 @@ class Panel {
            (kPanelHeight - kTop - kBottom) * (y - y_.from) / (y_.to - y_.from);
   }
 
-  template <typename... Values>
-  void add(fmt::format_string<Values...> format, Values&&... values) {
-    fmt::format_to(std::back_inserter(svg_), format, std::forward<Values>(values)...);
-  }
-
-  void text(double x, double y, const char* anchor, const std::string& words) {
-    add("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\">{}</text>\n", x, y, anchor, words);
-  }
-
   void ticks(double share) {
     const double x = x_.from + share * (x_.to - x_.from);
     const double y = y_.from + share * (y_.to - y_.from);
-    add("<line x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\" stroke=\"#ddd\"/>\n", x_of(x_.from),
-        y_of(y), x_of(x_.to), y_of(y));
-    text(x_of(x_.from) - 8, y_of(y) + 4, "end", fmt::format("{:.1f}", y));
-    text(x_of(x), y_of(y_.from) + 20, "middle", fmt::format("{:g}", std::round(10.0 * x) / 10.0));
+    svg_.line({x_of(x_.from), y_of(y)}, {x_of(x_.to), y_of(y)}, "stroke=\"#ddd\"");
+    svg_.text({x_of(x_.from) - 8, y_of(y) + 4}, Anchor::end, kInk, fmt::format("{:.1f}", y));
+    svg_.text({x_of(x), y_of(y_.from) + 20}, Anchor::middle, kInk,
+              fmt::format("{:g}", std::round(10.0 * x) / 10.0));
   }
 
   void curve(const Line& line, const char* colour) {
-    add("<polyline fill=\"none\" stroke=\"{}\" stroke-width=\"2\" points=\"", colour);
-    for (const Point& point : line.points) add("{:.1f},{:.1f} ", x_of(point.x), y_of(point.y));
-    add("\"/>\n");
-    for (const Point& point : line.points) {
-      add("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3.5\" fill=\"{}\"/>\n", x_of(point.x), y_of(point.y),
-          colour);
-    }
+    std::vector<Place> places;
+    for (const Place& point : line.points) places.push_back({x_of(point.x), y_of(point.y)});
+    svg_.polyline(places, colour);
+    for (const Place& place : places) svg_.dot(place, 3.5, colour);
   }
 
   double left_;
@@ -142,30 +133,15 @@ class Panel {
   const Axis& axis_;
   Range x_;
   Range y_;
-  std::string svg_;
+  Svg svg_;
 };
 
-std::string escaped(const std::string& text) {
-  std::string result;
-  for (const char c : text) {
-    if (c == '&') {
-      result += "&amp;";
-    } else if (c == '<') {
-      result += "&lt;";
-    } else {
-      result += c;
-    }
-  }
-  return result;
-}
-
-std::string legend(const std::vector<Line>& lines) {
-  std::string svg;
+Svg legend(const std::vector<Line>& lines) {
+  Svg svg;
   double x = kLeft;
   for (std::size_t i = 0; i < lines.size(); ++i) {
-    svg += fmt::format("<circle cx=\"{:.1f}\" cy=\"16\" r=\"5\" fill=\"{}\"/>\n", x,
-                       kColours[i % kColours.size()]);
-    svg += fmt::format("<text x=\"{:.1f}\" y=\"20\">{}</text>\n", x + 10, escaped(lines[i].dataset));
+    svg.dot({x, 16}, 5, kColours[i % kColours.size()]);
+    svg.text({x + 10, 20}, Anchor::start, kInk, lines[i].dataset);
     x += 30.0 + 8.0 * static_cast<double>(lines[i].dataset.size());
   }
   return svg;
@@ -174,7 +150,7 @@ std::string legend(const std::vector<Line>& lines) {
 }  // namespace
 
 std::string adaptation_figure(const Tables& tables) {
-  std::string panels;
+  Svg panels;
   std::vector<Line> named;
   double top = kLegendHeight;
   for (const Axis& axis : {kByIterations, kByKeypoints}) {
@@ -182,18 +158,16 @@ std::string adaptation_figure(const Tables& tables) {
     for (const Metric metric : {Metric::auc, Metric::pa_mpjpe}) {
       const std::vector<Line> lines = lines_of(tables, axis, metric);
       if (lines.empty()) continue;
-      panels += Panel(left, top, lines, kMetrics[index_of(metric)], axis).draw();
+      panels.append(Panel(left, top, lines, kMetrics[index_of(metric)], axis).draw());
       left += kPanelWidth;
       if (lines.size() > named.size()) named = lines;
     }
     if (left > 0.0) top += kPanelHeight;
   }
-  if (panels.empty()) return {};
-  return fmt::format(
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0:.0f}\" height=\"{1:.0f}\" viewBox=\"0 0 {0:.0f} "
-      "{1:.0f}\" font-family=\"sans-serif\" font-size=\"13\" fill=\"#222\">\n<rect width=\"{0:.0f}\" "
-      "height=\"{1:.0f}\" fill=\"#fff\"/>\n{2}{3}</svg>\n",
-      2 * kPanelWidth, top, legend(named), panels);
+  if (panels.is_empty()) return {};
+  Svg svg = legend(named);
+  svg.append(panels);
+  return svg.document(2 * kPanelWidth, top);
 }
 
 }  // namespace q3d::pipeline::evaluation

@@ -11,6 +11,7 @@
 #include "loaders/pictures/encode.h"
 #include "loaders/pictures/image.h"
 #include "manifests/atomic_file.h"
+#include "pipeline/figure/svg.h"
 
 namespace q3d::pipeline::leakage {
 namespace {
@@ -43,29 +44,6 @@ std::string base64(std::span<const std::byte> bytes) {  // RFC 4648
   return text;
 }
 
-std::string escaped(std::string_view text) {
-  std::string html;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        html += "&amp;";
-        break;
-      case '<':
-        html += "&lt;";
-        break;
-      case '>':
-        html += "&gt;";
-        break;
-      case '"':
-        html += "&quot;";
-        break;
-      default:
-        html += c;
-    }
-  }
-  return html;
-}
-
 struct Figure {
   std::string path;
   std::string caption;
@@ -85,7 +63,8 @@ std::string figure_html(const Figure& figure) {
     picture = fmt::format("<img src=\"data:image/jpeg;base64,{}\" alt=\"\">",
                           base64(loaders::pictures::encode_jpeg(small, kJpegQuality)));
   }
-  return fmt::format("<figure>{}<figcaption>{}</figcaption></figure>", picture, escaped(figure.caption));
+  return fmt::format("<figure>{}<figcaption>{}</figcaption></figure>", picture,
+                     figure::escaped(figure.caption));
 }
 
 struct Row {
@@ -124,7 +103,7 @@ std::vector<Row> group_rows(const LeakageReport& report, const candidates::Inges
 std::string rows_html(const std::vector<Row>& rows) {
   std::vector<std::string> parts(rows.size());
   tbb::parallel_for(std::size_t{0}, rows.size(), [&](std::size_t i) {
-    parts[i] = fmt::format("<div class=\"row\"><div class=\"why\">{}</div>", escaped(rows[i].why));
+    parts[i] = fmt::format("<div class=\"row\"><div class=\"why\">{}</div>", figure::escaped(rows[i].why));
     for (const Figure& figure : rows[i].figures) parts[i] += figure_html(figure);
     parts[i] += "</div>\n";
   });

@@ -3,20 +3,26 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <iterator>
+#include <vector>
+
+#include "pipeline/figure/svg.h"
 
 namespace q3d::pipeline::report {
 namespace {
 
+using figure::Anchor;
+using figure::Place;
+using figure::Svg;
 using filters::YieldPoint;
 
-constexpr int kWidth = 760;
-constexpr int kPanelHeight = 380;
+constexpr double kWidth = 760;
+constexpr double kPanelHeight = 380;
 constexpr double kLeft = 60, kRight = kWidth - 60, kTop = 60, kBottom = kPanelHeight - 60;
 constexpr const char* kYieldColour = "#1f5fa8";
 constexpr const char* kAucColour = "#c25a12";
+constexpr const char* kInk = "#222";
+constexpr double kDotPx = 4;
 constexpr std::size_t kTableSteps = 10;
 
 // The axis of tau ends where nearly all of the pool has been let in; a few errors lie far beyond.
@@ -46,7 +52,7 @@ class Panel {
   Panel(const filters::CalibratedPool& pool, double top)
       : pool_(pool), top_(top), last_tau_(last_tau(pool)) {}
 
-  std::string draw() {
+  Svg draw() {
     title();
     axes();
     curve(kYieldColour, [](const YieldPoint& point) { return 100.0 * point.yield; });
@@ -60,69 +66,55 @@ class Panel {
   double x_of(double tau) const { return kLeft + (kRight - kLeft) * tau / last_tau_; }
   double y_of(double percent) const { return top_ + kBottom - (kBottom - kTop) * percent / 100.0; }
 
-  template <typename... Values>
-  void add(fmt::format_string<Values...> format, Values&&... values) {
-    fmt::format_to(std::back_inserter(svg_), format, std::forward<Values>(values)...);
-  }
-
-  void text(double x, double y, const char* anchor, const char* colour, const std::string& words) {
-    add("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\" fill=\"{}\">{}</text>\n", x, y, anchor, colour,
-        words);
-  }
-
-  void line(double x1, double y1, double x2, double y2, const char* style) {
-    add("<line x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\" {}/>\n", x1, y1, x2, y2, style);
-  }
-
   void title() {
-    text(kLeft, top_ + 24, "start", "#222",
-         fmt::format("{}: {} predictions", pool_.dataset.empty() ? "all datasets" : pool_.dataset,
-                     pool_.judged));
+    svg_.text({kLeft, top_ + 24}, Anchor::start, kInk,
+              fmt::format("{}: {} predictions", pool_.dataset.empty() ? "all datasets" : pool_.dataset,
+                          pool_.judged));
   }
 
   void axes() {
     for (int percent = 0; percent <= 100; percent += 20) {
-      line(kLeft, y_of(percent), kRight, y_of(percent), "stroke=\"#ddd\"");
-      text(kLeft - 8, y_of(percent) + 4, "end", kYieldColour, std::to_string(percent));
-      text(kRight + 8, y_of(percent) + 4, "start", kAucColour, std::to_string(percent));
+      const double y = y_of(percent);
+      svg_.line({kLeft, y}, {kRight, y}, "stroke=\"#ddd\"");
+      svg_.text({kLeft - 8, y + 4}, Anchor::end, kYieldColour, std::to_string(percent));
+      svg_.text({kRight + 8, y + 4}, Anchor::start, kAucColour, std::to_string(percent));
     }
     const double step = tick_step(last_tau_);
     for (int i = 0; i * step <= last_tau_; ++i) {
-      line(x_of(i * step), y_of(0), x_of(i * step), y_of(0) + 5, "stroke=\"#888\"");
-      text(x_of(i * step), y_of(0) + 20, "middle", "#222", fmt::format("{:g}", i * step));
+      const double x = x_of(i * step);
+      svg_.line({x, y_of(0)}, {x, y_of(0) + 5}, "stroke=\"#888\"");
+      svg_.text({x, y_of(0) + 20}, Anchor::middle, kInk, fmt::format("{:g}", i * step));
     }
-    text((kLeft + kRight) / 2, y_of(0) + 42, "middle", "#222", "threshold on L_proj (crop side = 1)");
-    text(kLeft, y_of(100) - 10, "start", kYieldColour, "yield, % of the predictions below the threshold");
-    text(kRight, y_of(100) - 10, "end", kAucColour, "their mean AUC, %, by the whole crop");
+    svg_.text({(kLeft + kRight) / 2, y_of(0) + 42}, Anchor::middle, kInk,
+              "threshold on L_proj (crop side = 1)");
+    svg_.text({kLeft, y_of(100) - 10}, Anchor::start, kYieldColour,
+              "yield, % of the predictions below the threshold");
+    svg_.text({kRight, y_of(100) - 10}, Anchor::end, kAucColour, "their mean AUC, %, by the whole crop");
   }
 
   template <typename Percent>
   void curve(const char* colour, Percent percent) {
-    add("<polyline fill=\"none\" stroke=\"{}\" stroke-width=\"2\" points=\"", colour);
+    std::vector<Place> places;
     for (const YieldPoint& point : pool_.curve) {
-      if (point.tau <= last_tau_) add("{:.1f},{:.1f} ", x_of(point.tau), y_of(percent(point)));
+      if (point.tau <= last_tau_) places.push_back({x_of(point.tau), y_of(percent(point))});
     }
-    add("\"/>\n");
+    svg_.polyline(places, colour);
   }
 
   // `row` keeps the two labels apart where the thresholds lie close together.
   void chosen(const char* name, const YieldPoint& point, int row) {
     const double x = x_of(point.tau);
-    line(x, y_of(100), x, y_of(0), "stroke=\"#222\" stroke-dasharray=\"5 4\"");
-    dot(x, y_of(100.0 * point.yield), kYieldColour);
-    if (std::isfinite(point.auc)) dot(x, y_of(point.auc), kAucColour);
-    text(x + 6, y_of(14.0 - 7.0 * row), "start", "#222",
-         fmt::format("{} {:.4g}: yield {:.1f} %", name, point.tau, 100.0 * point.yield));
-  }
-
-  void dot(double x, double y, const char* colour) {
-    add("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"4\" fill=\"{}\"/>\n", x, y, colour);
+    svg_.line({x, y_of(100)}, {x, y_of(0)}, "stroke=\"#222\" stroke-dasharray=\"5 4\"");
+    svg_.dot({x, y_of(100.0 * point.yield)}, kDotPx, kYieldColour);
+    if (std::isfinite(point.auc)) svg_.dot({x, y_of(point.auc)}, kDotPx, kAucColour);
+    svg_.text({x + 6, y_of(14.0 - 7.0 * row)}, Anchor::start, kInk,
+              fmt::format("{} {:.4g}: yield {:.1f} %", name, point.tau, 100.0 * point.yield));
   }
 
   const filters::CalibratedPool& pool_;
   double top_;
   double last_tau_;
-  std::string svg_;
+  Svg svg_;
 };
 
 std::string table_line(const YieldPoint& point, const std::string& remark) {
@@ -134,17 +126,13 @@ std::string table_line(const YieldPoint& point, const std::string& remark) {
 }  // namespace
 
 std::string calibration_figure(std::span<const filters::CalibratedPool> pools) {
-  const auto height = kPanelHeight * static_cast<int>(pools.size());
-  std::string svg = fmt::format(
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{1}\" viewBox=\"0 0 {0} {1}\" "
-      "font-family=\"sans-serif\" font-size=\"13\">\n<rect width=\"{0}\" height=\"{1}\" fill=\"#fff\"/>\n",
-      kWidth, height);
+  Svg svg;
   double top = 0.0;
   for (const filters::CalibratedPool& pool : pools) {
-    svg += Panel(pool, top).draw();
+    svg.append(Panel(pool, top).draw());
     top += kPanelHeight;
   }
-  return svg + "</svg>\n";
+  return svg.document(kWidth, top);
 }
 
 std::string calibration_table(const filters::CalibratedPool& pool) {
