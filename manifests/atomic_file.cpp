@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <random>
 #include <stdexcept>
 #include <system_error>
 
@@ -16,10 +17,12 @@ namespace {
 namespace fs = std::filesystem;
 
 // The temporary file lies in the target's folder, because rename works only within a file system. Process id
-// and counter keep two writers of one path apart.
+// and counter keep two writers of one path apart, and a random number those on two machines.
 fs::path temporary_name(const fs::path& path) {
   static std::atomic<unsigned> counter{0};
-  return path.parent_path() / fmt::format("{}.{}.{}.tmp", path.filename().string(), ::getpid(), counter++);
+  static const unsigned machine = std::random_device{}();
+  return path.parent_path() /
+         fmt::format("{}.{}.{:08x}.{}.tmp", path.filename().string(), ::getpid(), machine, counter++);
 }
 
 class RemoveOnFailure {

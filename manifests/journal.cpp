@@ -87,6 +87,14 @@ void Journal::repair() {
   sound_lines_.reset();
 }
 
+void Journal::write_anew() {
+  std::string lines;
+  for (const auto& [unit, entry] : entries_) lines += seal_line(to_payload(entry));
+  write_file_atomically(file_, lines);
+  whole_bytes_ = file_bytes_ = lines.size();
+  sound_lines_.reset();
+}
+
 void Journal::append(const JournalEntry& entry) {
   if (!stays_in_folder(entry.file)) {
     throw std::invalid_argument(fmt::format("{}: a journal entry's file must stay in the folder, got {}",

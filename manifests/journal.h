@@ -36,6 +36,10 @@ class Journal {
   // as it was. Throws std::invalid_argument if entry.file leaves the journal's folder.
   void append(const JournalEntry& entry);
   const std::map<std::int64_t, JournalEntry>& entries() const { return entries_; }
+  // Counts an entry of another journal of the same folder. The file does not hold it before write_anew().
+  void adopt(const JournalEntry& entry) { entries_.insert_or_assign(entry.unit, entry); }
+  // Writes the file atomically with one line for each entry, in the order of the units. Throws IoError.
+  void write_anew();
   // True if loading dropped a torn last line. Its unit will be made again.
   bool dropped_torn_line() const { return dropped_torn_line_; }
   // Numbers, from 1 on, of the other lines that loading dropped: their checksum or their fields do not match.

@@ -1,20 +1,20 @@
-// The one file that sees c10d. The wheel holds gloo but not its headers, which Debian's libgloo-dev supplies.
-// They are older than the wheel's gloo, so nothing here touches a gloo type but through c10d, and no libgloo
-// is linked.
+// Beside tcp_store.h, the one file that sees c10d. The wheel holds gloo but not its headers, which Debian's
+// libgloo-dev supplies. They are older than the wheel's gloo, so nothing here touches a gloo type but through
+// c10d, and no libgloo is linked.
 #include "model/ranks/process_group.h"
 
 #define USE_C10D_GLOO
 #include <fmt/format.h>
 #include <torch/version.h>
 
-#include <torch/csrc/distributed/c10d/PrefixStore.hpp>
 #include <torch/csrc/distributed/c10d/ProcessGroup.hpp>
 #include <torch/csrc/distributed/c10d/ProcessGroupGloo.hpp>
-#include <torch/csrc/distributed/c10d/TCPStore.hpp>
 #include <torch/csrc/distributed/c10d/reducer.hpp>
 
 #include <algorithm>
 #include <stdexcept>
+
+#include "model/ranks/tcp_store.h"
 
 namespace q3d::model::ranks {
 namespace {
@@ -23,12 +23,6 @@ static_assert(TORCH_VERSION_MAJOR == 2 && TORCH_VERSION_MINOR == 11,
               "c10d's classes are no stable interface: check the calls here against another LibTorch");
 
 using GroupPointer = c10::intrusive_ptr<c10d::ProcessGroup>;
-
-std::string first_line(const std::exception& error) {
-  const auto* torch_error = dynamic_cast<const c10::Error*>(&error);
-  const std::string text = torch_error != nullptr ? torch_error->what_without_backtrace() : error.what();
-  return text.substr(0, text.find('\n'));
-}
 
 // Says which rank speaks, for all of them write to one terminal.
 template <typename Call>
@@ -121,20 +115,9 @@ class Ranks : public Collective {
   GroupPointer group_;
 };
 
-c10::intrusive_ptr<c10d::Store> open_store(const RankPlace& place) {
-  c10d::TCPStoreOptions options;
-  options.port = place.master_port;
-  options.isServer = place.rank == 0 && !place.launcher_has_store;
-  options.numWorkers = static_cast<std::size_t>(place.size);
-  options.timeout = place.join_timeout;
-  // Torchrun keeps keys of its own in the store.
-  return c10::make_intrusive<c10d::PrefixStore>(
-      "quadruped3d", c10::make_intrusive<c10d::TCPStore>(place.master_address, options));
-}
-
 // Gloo for tensors on the CPU and, over a copy on the host, on a GPU.
 GroupPointer open_group(const RankPlace& place, torch::Device device) {
-  const auto store = open_store(place);
+  const auto store = open_tcp_store(place, "training", Gathering::together);
   // The interface is that of the host's name, or GLOO_SOCKET_IFNAME.
   const auto options = c10d::ProcessGroupGloo::Options::create_default(place.join_timeout);
   const auto gloo = c10::make_intrusive<c10d::ProcessGroupGloo>(store, place.rank, place.size, options);

@@ -1,7 +1,10 @@
 #include "model/ranks/rank_place.h"
 
 #include <fmt/format.h>
+#include <sched.h>
+#include <unistd.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cstdlib>
 #include <cstring>
@@ -18,7 +21,7 @@ struct Names {
   const char* local_size;
 };
 constexpr Names kTorchrun{"RANK", "WORLD_SIZE", "LOCAL_RANK", "LOCAL_WORLD_SIZE"};
-constexpr Names kSlurm{"SLURM_PROCID", "SLURM_NTASKS", "SLURM_LOCALID", "SLURM_NTASKS_PER_NODE"};
+constexpr Names kSlurm{"SLURM_PROCID", "SLURM_NTASKS", "SLURM_LOCALID", "SLURM_STEP_TASKS_PER_NODE"};
 
 int number(const char* name, const char* text, int least, int most) {
   int value = 0;
@@ -42,6 +45,14 @@ int optional(const char* name, int least, int most, int otherwise) {
   return text == nullptr ? otherwise : number(name, text, least, most);
 }
 
+// "4" of torchrun; "4(x2),3" of Slurm, whose first number is that of the first machines.
+int ranks_of_machine(const char* name, int most) {
+  const char* text = std::getenv(name);
+  if (text == nullptr) return optional("SLURM_NTASKS_PER_NODE", 1, most, 1);
+  const std::string first(text, std::strcspn(text, "(,"));
+  return number(name, first.c_str(), 1, most);
+}
+
 RankPlace place(const Names& names) {
   constexpr int kMost = std::numeric_limits<int>::max();
   RankPlace place;
@@ -49,7 +60,7 @@ RankPlace place(const Names& names) {
   if (place.size == 1) return {};
   place.rank = required(names.rank, 0, place.size - 1);
   place.local_rank = optional(names.local_rank, 0, place.size - 1, 0);
-  place.local_size = optional(names.local_size, 1, place.size, 1);
+  place.local_size = ranks_of_machine(names.local_size, place.size);
   place.master_port = static_cast<std::uint16_t>(required("MASTER_PORT", 1, 65535));
   const char* address = std::getenv("MASTER_ADDR");
   if (address == nullptr || *address == '\0') {
@@ -59,7 +70,14 @@ RankPlace place(const Names& names) {
   place.master_address = address;
   const char* agent = std::getenv("TORCHELASTIC_USE_AGENT_STORE");
   place.launcher_has_store = agent != nullptr && std::strcmp(agent, "True") == 0;
+  place.attempt = optional("TORCHELASTIC_RESTART_COUNT", 0, kMost, 0);
   return place;
+}
+
+// Cores on which this process may run; 0 if the kernel does not say.
+int allowed_cores() {
+  cpu_set_t cores;
+  return ::sched_getaffinity(0, sizeof(cores), &cores) == 0 ? CPU_COUNT(&cores) : 0;
 }
 
 }  // namespace
@@ -69,6 +87,13 @@ RankPlace rank_place_from_environment() {
   // Only srun numbers a step; sbatch and salloc, which start one process, set the other variables too.
   if (std::getenv("SLURM_STEP_ID") != nullptr && std::getenv(kSlurm.size) != nullptr) return place(kSlurm);
   return {};
+}
+
+int own_cores(const RankPlace& place) {
+  const int online = std::max(1, static_cast<int>(::sysconf(_SC_NPROCESSORS_ONLN)));
+  const int allowed = allowed_cores();
+  if (allowed > 0 && allowed < online) return allowed;
+  return std::max(1, online / place.local_size);
 }
 
 }  // namespace q3d::model::ranks

@@ -15,14 +15,19 @@ struct RankPlace {
   std::string master_address;  // where the ranks meet; empty in a world of one
   std::uint16_t master_port = 0;
   bool launcher_has_store = false;           // torchrun's agent listens there; else rank 0 does
+  int attempt = 0;                           // how often torchrun has started the ranks again
   std::chrono::seconds join_timeout{300};    // for all ranks to appear
   std::chrono::seconds answer_timeout{600};  // for a rank that computes
 };
 
 // torchrun: RANK, WORLD_SIZE, LOCAL_RANK, LOCAL_WORLD_SIZE, MASTER_ADDR, MASTER_PORT. Slurm's srun:
-// SLURM_PROCID, SLURM_NTASKS, SLURM_LOCALID, SLURM_NTASKS_PER_NODE, with MASTER_ADDR and MASTER_PORT set by
-// the user. Neither, or one rank: a world of one. Throws std::invalid_argument naming the variable, got and
-// expected.
+// SLURM_PROCID, SLURM_NTASKS, SLURM_LOCALID, SLURM_STEP_TASKS_PER_NODE or SLURM_NTASKS_PER_NODE, with
+// MASTER_ADDR and MASTER_PORT set by the user. Neither, or one rank: a world of one. Throws
+// std::invalid_argument naming the variable, got and expected.
 RankPlace rank_place_from_environment();
+
+// How many cores of this machine are the rank's own, at least 1. A launcher that binds its ranks to cores, as
+// srun does, has divided them already; else the ranks of a machine get equal shares.
+int own_cores(const RankPlace& place);
 
 }  // namespace q3d::model::ranks

@@ -2,10 +2,14 @@
 
 #include <chrono>
 #include <cmath>
+#include <filesystem>
 #include <map>
+#include <memory>
+#include <utility>
 
 #include "pipeline/build/publish.h"
 #include "pipeline/build/quality.h"
+#include "pipeline/build/rank_share.h"
 #include "pipeline/build/unit_builder.h"
 #include "pipeline/build/workspace.h"
 #include "pipeline/run/log.h"
@@ -44,42 +48,85 @@ void publish_units(const config::BuildConfig& config, const config::JudgingRules
   publish(summary.folder, inputs, units.judgements(), units.shards());
 }
 
-}  // namespace
-
-BuildSummary build(const config::BuildConfig& config, const run::RunOptions& options,
-                   const BuildRequest& request) {
-  const auto start = std::chrono::steady_clock::now();
-  const config::JudgingRules rules = checked_rules(config, options.above_ceiling);
-  Workspace workspace(config, options);
-  BuildSummary summary;
-  summary.plan = stages::plan_of(config, rules, workspace.ingest(), workspace.assets(),
-                                 workspace.device_key(), request.command);
-  const stages::StageKeys& keys = summary.plan.keys;
-  stages::write_build_plan(options.out, summary.plan);
-  summary.folder = version_folder(options.out, config, keys);
-  summary.notes = workspace.ingest().notes;
-  summary.was_up_to_date = is_published(summary.folder, keys) && !options.rebuild;
-  workspace.digests().save();
-  const auto seconds = [&] {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+// Makes this rank's units. In rank 0 the dataset is then ready to be published, unless the request ends
+// before.
+void make_units(const config::JudgingRules& rules, const BuildRequest& request, RankShare& ranks,
+                Workspace& workspace, BuildSummary& summary) {
+  const stages::Stage until = request.until.value_or(stages::Stage::shards);
+  const auto make = [&] {
+    return std::make_unique<UnitBuilder>(ranks.config(), rules, summary.plan.keys, until, workspace, ranks);
   };
-  if (!summary.was_up_to_date) {
-    const stages::Stage until = request.until.value_or(stages::Stage::shards);
-    UnitBuilder units(config, rules, keys, until, workspace);
-    if (until != stages::Stage::ingest) units.run();
-    summary.crops_encoded = units.crops_encoded();
-    if (request.until) {
-      summary.stopped_after = until;
-      summary.seconds = seconds();
-      return summary;
-    }
-    publish_units(config, rules, workspace, summary, units);
+  std::unique_ptr<UnitBuilder> units;
+  if (ranks.leads() && !summary.was_up_to_date) units = make();  // takes over what an earlier run left
+  summary.was_up_to_date = ranks.agree(summary.plan.keys.dataset, summary.was_up_to_date);
+  if (summary.was_up_to_date) return;
+  if (!units) units = make();
+  if (until != stages::Stage::ingest) units->run();
+  summary.crops_encoded = units->crops_encoded();
+  if (request.until) {
+    summary.stopped_after = until;
+  } else if (ranks.leads()) {
+    publish_units(ranks.config(), rules, workspace, summary, *units);
   }
+}
+
+// A rank whose last units the others have made too may find rank 0 gone.
+void make_units_beside_leader(const config::JudgingRules& rules, const BuildRequest& request,
+                              RankShare& ranks, Workspace& workspace, BuildSummary& summary) {
+  try {
+    make_units(rules, request, ranks, workspace, summary);
+  } catch (const LeaderLost&) {
+    if (!std::filesystem::exists(summary.folder / "dataset.json")) throw;
+  }
+}
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+// Tells what a finished dataset is worth, and makes it the newest. The caller holds the folder's lock.
+void finish(const run::RunOptions& options, BuildSummary& summary, Clock::time_point start) {
   summary.dataset = dataset::read_dataset_manifest(summary.folder);
   for (const dataset::Warning& warning : summary.dataset.warnings) run::log_warning(warning.message);
   require_labels(summary.dataset, summary.folder);
   if (!options.rebuild) point_latest(options.out, summary.folder);
-  summary.seconds = seconds();
+  summary.seconds = seconds_since(start);
+}
+
+}  // namespace
+
+BuildSummary build(const config::BuildConfig& config, const run::RunOptions& options,
+                   const BuildRequest& request) {
+  const auto start = Clock::now();
+  const config::JudgingRules rules = checked_rules(config, options.above_ceiling);
+  RankShare ranks(config, options, "build");
+  BuildSummary summary;
+  summary.rank = ranks.rank();
+  if (!ranks.await_digests()) return summary;
+  Workspace workspace(ranks.config(), ranks.options(),
+                      ranks.leads() ? Workspace::Use::work : Workspace::Use::join);
+  ranks.tell_digests();
+  summary.plan = stages::plan_of(config, rules, workspace.ingest(), workspace.assets(),
+                                 workspace.device_key(), request.command);
+  const stages::StageKeys& keys = summary.plan.keys;
+  summary.folder = version_folder(options.out, config, keys);
+  if (!ranks.leads()) {
+    make_units_beside_leader(rules, request, ranks, workspace, summary);
+    return summary;
+  }
+  stages::write_build_plan(options.out, summary.plan);
+  summary.notes = workspace.ingest().notes;
+  summary.was_up_to_date = is_published(summary.folder, keys) && !options.rebuild;
+  workspace.digests().save();
+  make_units(rules, request, ranks, workspace, summary);
+  ranks.end();
+  if (summary.stopped_after) {
+    summary.seconds = seconds_since(start);
+    return summary;
+  }
+  finish(options, summary, start);
   return summary;
 }
 

@@ -32,7 +32,9 @@ struct BuildSummary {
   double seconds = 0.0;
   bool was_up_to_date = false;
   std::vector<candidates::IngestNote> notes;  // of reading the datasets
-  std::int64_t crops_encoded = 0;  // stored crops that no earlier build had left in the output folder
+  int rank = 0;                               // rank 0 speaks for all; the others' summaries have no dataset
+  std::int64_t crops_encoded =
+      0;  // stored crops, by this process, that no earlier build had left in the output folder
 };
 
 // Makes <out>/<name>-<key>/ and points <out>/latest at it; goes on where an earlier run ended. Throws
@@ -40,7 +42,8 @@ struct BuildSummary {
 // tau_high is above filter.tau_ceiling (unless options.above_ceiling); and if no label was kept: then the
 // folder is there, with its verdicts, but <out>/latest stays where it was. Warnings about the labels' quality
 // are in summary.dataset.warnings, and were told to the log. With request.until the run ends after that stage
-// and publishes nothing, unless the finished dataset is there already.
+// and publishes nothing, unless the finished dataset is there already. With options.shares_units the ranks
+// that a launcher started share the units, and rank 0 publishes the same bytes as one process (rank_share.h).
 BuildSummary build(const config::BuildConfig& config, const run::RunOptions& options,
                    const BuildRequest& request = {});
 

@@ -10,13 +10,17 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <memory>
 #include <stdexcept>
+#include <utility>
 
 #include "filters/metrics.h"
 #include "loaders/pictures/crop.h"
 #include "manifests/atomic_file.h"
+#include "manifests/digest.h"
 #include "pipeline/build/prediction_progress.h"
 #include "pipeline/build/quality.h"
+#include "pipeline/build/rank_share.h"
 #include "pipeline/build/workspace.h"
 #include "pipeline/run/errors.h"
 #include "pipeline/run/interrupt.h"
@@ -43,19 +47,13 @@ struct Scored {
   filters::ScoredSample score;
 };
 
-// Returns the scores of every candidate that is not excluded, has the role `pseudo` and has a prediction, in
-// ingest order. Predictions of an earlier run are used again.
-std::vector<Scored> predict_pool(const config::BuildConfig& config, Workspace& workspace) {
-  const candidates::Ingest& ingest = workspace.ingest();
-  stages::StageStore predictions(workspace.out(), "predict",
-                                 stages::predict_key(config, workspace.assets(), workspace.device_key()));
-  std::vector<Scored> scored;
-  run::Progress progress("predicted", static_cast<std::int64_t>(ingest.candidates.size()), workspace.quiet());
-  PredictionProgress predicted(progress);
+// Takes every unit as far as its predictions, using those of an earlier run. The caller adds `write`.
+unit::UnitFlow prediction_flow(const config::BuildConfig& config, Workspace& workspace,
+                               stages::StageStore& predictions, PredictionProgress& predicted) {
   unit::UnitFlow flow;
-  flow.units = static_cast<std::int64_t>(ingest.units.size());
+  flow.units = static_cast<std::int64_t>(workspace.ingest().units.size());
   flow.read = [&](std::int64_t index) {
-    const std::shared_ptr<unit::UnitWork> work = unit::open_unit(ingest, index);
+    const std::shared_ptr<unit::UnitWork> work = unit::open_unit(workspace.ingest(), index);
     if (const auto table = predictions.load(*work->unit))
       unit::set_predictions(*work, unit::predicted_from_table(*table));
     work->predicted_before = work->predicted.has_value();
@@ -68,9 +66,44 @@ std::vector<Scored> predict_pool(const config::BuildConfig& config, Workspace& w
                        {&predicted, static_cast<std::size_t>(config.network.batch)});
     predicted.tell();
   };
+  return flow;
+}
+
+void save_predictions(const unit::UnitWork& work, stages::StageStore& predictions) {
+  if (!work.predicted_before) predictions.save(*work.unit, unit::to_table(work.candidates, *work.predicted));
+}
+
+// Lets the ranks share the predictions. Afterwards rank 0 finds those of all ranks in `predictions`.
+void predict_with_ranks(const config::BuildConfig& config, Workspace& workspace,
+                        stages::StageStore& predictions, RankShare& ranks) {
+  run::Progress progress("predicted", static_cast<std::int64_t>(workspace.ingest().candidates.size()),
+                         workspace.quiet());
+  PredictionProgress predicted(progress);
+  unit::UnitFlow flow = prediction_flow(config, workspace, predictions, predicted);
   flow.write = [&](unit::UnitWork& work) {
-    if (!work.predicted_before)
-      predictions.save(*work.unit, unit::to_table(work.candidates, *work.predicted));
+    save_predictions(work, predictions);
+    if (work.predicted_before) progress.advance(static_cast<std::int64_t>(work.unit->count), true);
+  };
+  const auto count = [](const unit::UnitWork& work) {
+    return model::ranks::Tally{static_cast<std::int64_t>(work.unit->count)};
+  };
+  ranks.make(std::move(flow), workspace.device(), count,
+             [&progress, told = std::int64_t{0}](const model::ranks::Tally& others) mutable {
+               progress.advance(others[0] - std::exchange(told, others[0]));
+             });
+  if (ranks.leads()) predictions.take_over_ranks();
+}
+
+// Returns the scores of every candidate that is not excluded, has the role `pseudo` and has a prediction, in
+// ingest order.
+std::vector<Scored> score_pool(const config::BuildConfig& config, Workspace& workspace,
+                               stages::StageStore& predictions, bool quiet) {
+  std::vector<Scored> scored;
+  run::Progress progress("predicted", static_cast<std::int64_t>(workspace.ingest().candidates.size()), quiet);
+  PredictionProgress predicted(progress);
+  unit::UnitFlow flow = prediction_flow(config, workspace, predictions, predicted);
+  flow.write = [&](unit::UnitWork& work) {
+    save_predictions(work, predictions);
     for (std::size_t i = 0; i < work.candidates.size(); ++i) {
       const candidates::Candidate& candidate = work.candidates[i];
       const bool is_judged = candidate.role == config::Role::pseudo && !std::isnan(work.errors[i]);
@@ -83,6 +116,32 @@ std::vector<Scored> predict_pool(const config::BuildConfig& config, Workspace& w
   };
   unit::run_units(flow, workspace.device());
   return scored;
+}
+
+// What must be the same in all ranks.
+std::string key_of_predictions(const config::BuildConfig& config, const Workspace& workspace) {
+  std::string text = stages::predict_key(config, workspace.assets(), workspace.device_key());
+  for (const candidates::Unit& unit : workspace.ingest().units) text += '\n' + unit.input_digest;
+  return manifests::sha256(text);
+}
+
+// Only rank 0 gets scores.
+std::vector<Scored> predict_pool(const config::BuildConfig& config, Workspace& workspace, RankShare& ranks) {
+  const auto open = [&] {
+    return std::make_unique<stages::StageStore>(
+        workspace.out(), "predict", stages::predict_key(config, workspace.assets(), workspace.device_key()),
+        &candidates::Unit::input_digest, ranks.of_store());
+  };
+  std::unique_ptr<stages::StageStore> predictions;
+  if (ranks.leads()) predictions = open();  // takes over what an earlier run left
+  if (ranks.is_shared()) {
+    ranks.agree(key_of_predictions(config, workspace), false);
+    if (!predictions) predictions = open();
+    predict_with_ranks(config, workspace, *predictions, ranks);
+    ranks.end();
+    if (!ranks.leads()) return {};
+  }
+  return score_pool(config, workspace, *predictions, workspace.quiet() || ranks.is_shared());
 }
 
 // Adapts some candidates for as long as the gain is measured and says which of them the fidelity rule would
@@ -250,10 +309,16 @@ CalibrationSummary calibrate(const config::BuildConfig& config, const run::RunOp
         "calibrate: `build` needs no thresholds here");
   }
   const auto start = std::chrono::steady_clock::now();
-  Workspace workspace(config, options);
+  RankShare ranks(config, options, "calibrate");
+  ranks.await_digests();
+  Workspace workspace(ranks.config(), ranks.options(),
+                      ranks.leads() ? Workspace::Use::work : Workspace::Use::join);
+  ranks.tell_digests();
   CalibrationSummary summary;
+  summary.rank = ranks.rank();
   summary.candidates = static_cast<std::int64_t>(workspace.ingest().candidates.size());
-  const std::vector<Scored> scored = predict_pool(config, workspace);
+  const std::vector<Scored> scored = predict_pool(ranks.config(), workspace, ranks);
+  if (!ranks.leads()) return summary;
   for (const auto& [dataset, candidates] : split_pool(scored, config)) {
     summary.pools.push_back(calibrate_pool(dataset, candidates, config, workspace));
   }

@@ -16,13 +16,15 @@ struct CalibrationSummary {
   std::vector<dataset::Warning> warnings;  // why labels of this pool may be worth little; the log told them
   std::int64_t candidates = 0;
   double seconds = 0.0;
+  int rank = 0;  // rank 0 speaks for all; the others' summaries are empty
 };
 
 // Predicts every candidate (a later build finds the predictions in the same output folder), then adapts
 // candidates in order of their error, under the guards that change adaptation, until enough of them reach
 // delta. AUC is against the annotated keypoints, by the whole crop. With config.calibrate.per_dataset every
 // dataset is a pool of its own. Throws ConfigError, std::runtime_error (also if a tau_high is above
-// filter.tau_ceiling, unless options.above_ceiling), Interrupted.
+// filter.tau_ceiling, unless options.above_ceiling), Interrupted. With options.shares_units the ranks that a
+// launcher started share the predictions (rank_share.h), and rank 0 adapts.
 CalibrationSummary calibrate(const config::BuildConfig& config, const run::RunOptions& options);
 
 // A config layer with the thresholds, for `build --config`.

@@ -20,18 +20,21 @@ namespace q3d::pipeline::build {
 using stages::Stage;
 
 UnitBuilder::UnitBuilder(const config::BuildConfig& config, const config::JudgingRules& rules,
-                         const stages::StageKeys& keys, Stage until, Workspace& workspace)
+                         const stages::StageKeys& keys, Stage until, Workspace& workspace, RankShare& ranks)
     : config_(config),
       rules_(rules),
       keys_(keys),
       until_(until),
       workspace_(workspace),
-      predictions_(workspace.out(), "predict", keys.predict),
-      refinements_(workspace.out(), "refine", keys.refine),
-      crops_(workspace.out(), "crops", keys.crops),
-      shards_(workspace.out(), "shards", keys.shards, &candidates::Unit::label_digest),
+      ranks_(ranks),
+      predictions_(workspace.out(), "predict", keys.predict, &candidates::Unit::input_digest,
+                   ranks.of_store()),
+      refinements_(workspace.out(), "refine", keys.refine, &candidates::Unit::input_digest, ranks.of_store()),
+      crops_(workspace.out(), "crops", keys.crops, &candidates::Unit::input_digest, ranks.of_store()),
+      shards_(workspace.out(), "shards", keys.shards, &candidates::Unit::label_digest, ranks.of_store()),
       terms_(dataset::terms_of_datasets(config)),
       judgements_(workspace.ingest().candidates.size()),
+      is_made_(workspace.ingest().units.size()),
       progress_(
           rules,
           {.judges = makes(Stage::fidelity),
@@ -42,7 +45,8 @@ UnitBuilder::UnitBuilder(const config::BuildConfig& config, const config::Judgin
   // Measurements go by the labels' digest, because a vetoed candidate is not measured. Without pseudo labels
   // there is no key.
   if (!keys.measure.empty() && makes(Stage::measure)) {
-    measurements_.emplace(workspace.out(), "measure", keys.measure, &candidates::Unit::label_digest);
+    measurements_.emplace(workspace.out(), "measure", keys.measure, &candidates::Unit::label_digest,
+                          ranks.of_store());
   }
 }
 
@@ -51,6 +55,16 @@ void UnitBuilder::run() {
     workspace_.device().run(
         [this] { measurer_ = std::make_unique<unit::LabelMeasurer>(load_measuring_models(config_)); });
   }
+  if (!ranks_.is_shared()) {
+    unit::run_units(flow(), workspace_.device());
+    return;
+  }
+  ranks_.make(flow(), workspace_.device(), &UnitProgress::counts_of,
+              [this](const UnitProgress::Counts& counts) { progress_.others(counts); });
+  if (ranks_.leads()) collect();
+}
+
+unit::UnitFlow UnitBuilder::flow() {
   unit::UnitFlow flow;
   flow.units = static_cast<std::int64_t>(workspace_.ingest().units.size());
   flow.read = [this](std::int64_t index) { return read(index); };
@@ -60,7 +74,21 @@ void UnitBuilder::run() {
     if (makes(Stage::crops)) unit::encode_crops(work, config_.shards);
   };
   flow.write = [this](unit::UnitWork& work) { write(work); };
-  unit::run_units(flow, workspace_.device());
+  return flow;
+}
+
+// Takes over what the other ranks have made, and makes what a rank that died has left undone.
+void UnitBuilder::collect() {
+  for (stages::StageStore* store : {&predictions_, &refinements_, &crops_, &shards_})
+    store->take_over_ranks();
+  if (measurements_) measurements_->take_over_ranks();
+  progress_.others({});  // these units are counted by their verdicts now
+  unit::UnitFlow rest = flow();
+  rest.claim = [this, next = std::size_t{0}]() mutable -> std::optional<std::int64_t> {
+    while (next < is_made_.size() && is_made_[next]) ++next;
+    return next < is_made_.size() ? std::optional(static_cast<std::int64_t>(next++)) : std::nullopt;
+  };
+  unit::run_units(rest, workspace_.device());
 }
 
 std::shared_ptr<unit::UnitWork> UnitBuilder::read(std::int64_t index) {
@@ -129,6 +157,7 @@ void UnitBuilder::write(unit::UnitWork& work) {
   if (makes(Stage::shards) && !work.shard_before) write_unit_shard(work);
   std::copy(work.judgements.begin(), work.judgements.end(),
             judgements_.begin() + static_cast<std::ptrdiff_t>(unit.first));
+  is_made_[static_cast<std::size_t>(unit.index)] = true;
 }
 
 void UnitBuilder::write_unit_shard(unit::UnitWork& work) {

@@ -10,30 +10,37 @@
 
 #include "manifests/shard.h"
 #include "manifests/verdict.h"
+#include "pipeline/build/rank_share.h"
 #include "pipeline/build/unit_progress.h"
 #include "pipeline/build/workspace.h"
 #include "pipeline/config/judging_rules.h"
 #include "pipeline/stages/stage.h"
 #include "pipeline/stages/stage_store.h"
 #include "pipeline/unit/label_measurer.h"
+#include "pipeline/unit/unit_flow.h"
 
 namespace q3d::pipeline::build {
 
 class UnitBuilder {
  public:
-  // All references must outlive the builder. `until` is the last stage that it makes. Throws as StageStore.
+  // All references must outlive the builder. `until` is the last stage that it makes. Rank 0 must construct
+  // its builder before the others construct theirs. Throws as StageStore.
   UnitBuilder(const config::BuildConfig& config, const config::JudgingRules& rules,
-              const stages::StageKeys& keys, stages::Stage until, Workspace& workspace);
+              const stages::StageKeys& keys, stages::Stage until, Workspace& workspace, RankShare& ranks);
 
-  // Throws std::runtime_error, manifests::IoError, Interrupted.
+  // Makes every unit, or this rank's; rank 0 then takes over what the others made, and makes what they left
+  // undone. Throws std::runtime_error, manifests::IoError, Interrupted.
   void run();
 
-  // Of every candidate, in ingest order. They are final only if `until` is the last stage.
+  // Of every candidate, in ingest order; in other ranks than 0, of those that they made. They are final only
+  // if `until` is the last stage.
   const std::vector<manifests::Judgement>& judgements() const { return judgements_; }
   stages::StageStore& shards() { return shards_; }
-  std::int64_t crops_encoded() const { return crops_encoded_; }  // in this run
+  std::int64_t crops_encoded() const { return crops_encoded_; }  // by this process
 
  private:
+  unit::UnitFlow flow();
+  void collect();
   unit::Watch watch(int batch) { return {&progress_, static_cast<std::size_t>(batch)}; }
   bool makes(stages::Stage stage) const { return stage <= until_; }
   std::shared_ptr<unit::UnitWork> read(std::int64_t index);
@@ -49,6 +56,7 @@ class UnitBuilder {
   const stages::StageKeys& keys_;
   stages::Stage until_;
   Workspace& workspace_;
+  RankShare& ranks_;
   stages::StageStore predictions_;
   stages::StageStore refinements_;
   stages::StageStore crops_;
@@ -57,6 +65,7 @@ class UnitBuilder {
   std::unique_ptr<unit::LabelMeasurer> measurer_;   // made and used on the device's thread
   std::map<std::string, manifests::DatasetTerms> terms_;  // by candidates::dataset_key
   std::vector<manifests::Judgement> judgements_;
+  std::vector<bool> is_made_;  // by unit: its judgements are there
   std::int64_t crops_encoded_ = 0;
   UnitProgress progress_;
 };

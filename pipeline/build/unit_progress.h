@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <mutex>
 #include <string>
 
 #include "manifests/verdict.h"
@@ -22,8 +23,8 @@ struct VerdictSteps {
 
 // A candidate counts as done when no later step of the run can change its verdict: a failed or hopeless one
 // after its prediction, an adapted one after its adaptation, and a label that is measured after that. So the
-// bar moves after each batch, and the counts of the verdicts add up to what is done. Called on the device's
-// thread alone.
+// bar moves after each batch, and the counts of the verdicts add up to what is done. All but others() are
+// called on the device's thread alone.
 class UnitProgress : public unit::StepObserver {
  public:
   UnitProgress(const config::JudgingRules& rules, VerdictSteps steps, std::int64_t candidates,
@@ -38,14 +39,20 @@ class UnitProgress : public unit::StepObserver {
   // Counts the unit by its final judgements. `from_earlier_run`: nothing of it was computed in this run.
   void finish(const unit::UnitWork& work, bool from_earlier_run);
 
- private:
   using Counts = std::array<std::int64_t, 4>;  // by manifests::Verdict
+  // What other processes have finished by now. May be called on any thread.
+  void others(const Counts& counts);
+  static Counts counts_of(const unit::UnitWork& work);
+
+ private:
   void count(manifests::Judgement judgement, const candidates::Candidate& candidate);
   void tell(std::int64_t count, bool from_earlier_run, const std::string& step);
 
   const config::JudgingRules& rules_;
   VerdictSteps steps_;
   std::int64_t units_;
+  std::mutex mutex_;       // guards what follows
+  Counts others_{};        // of the units of other processes
   Counts finished_{};      // of the units that are through
   Counts present_{};       // of the present unit, so far
   std::int64_t told_ = 0;  // candidates of the present unit that progress_ counts as done

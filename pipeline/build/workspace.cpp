@@ -25,7 +25,7 @@ std::filesystem::path made(const std::filesystem::path& folder) {
 }
 
 std::optional<manifests::FolderLock> locked(const std::filesystem::path& folder, Workspace::Use use) {
-  if (use == Workspace::Use::look) return std::nullopt;
+  if (use != Workspace::Use::work) return std::nullopt;
   return std::optional<manifests::FolderLock>(std::in_place, made(folder));
 }
 
@@ -42,12 +42,24 @@ std::size_t flow_threads(int wanted) {
   return std::max<std::size_t>(1, std::thread::hardware_concurrency());
 }
 
+void log_candidates(std::int64_t candidates, std::int64_t units, bool quiet) {
+  if (quiet) return;
+  run::log_info(fmt::format("{} in {}", run::counted(candidates, "candidate"), run::counted(units, "unit")));
+}
+
+void log_notes(const std::vector<candidates::IngestNote>& notes, bool quiet) {
+  for (const candidates::IngestNote& note : notes) {
+    const bool is_caution = note.kind == loaders::formats::NoteKind::caution;
+    if (is_caution || !quiet) run::log_note(note.line());
+  }
+}
+
 Workspace::Workspace(const config::BuildConfig& config, const run::RunOptions& options, Use use)
     : config_(config),
       options_(options),
       threads_(tbb::global_control::max_allowed_parallelism, flow_threads(options.threads)),
       lock_(locked(options.out, use)),
-      scratch_(use == Use::look ? std::optional<ScratchCopy>(std::in_place, options.out) : std::nullopt),
+      scratch_(use != Use::work ? std::optional<ScratchCopy>(std::in_place, options.out) : std::nullopt),
       digests_((scratch_ ? scratch_->folder() : options.out) / "digests.txt"),
       assets_(stages::digest_assets(config, digests_)),
       device_key_(config::needs_network(config) ? network::device_key(config.network) : std::string()),
@@ -55,15 +67,9 @@ Workspace::Workspace(const config::BuildConfig& config, const run::RunOptions& o
       ingest_(candidates::ingest(config, digests_, network::load_body_meshes)) {
   if (!scratch_) manifests::remove_temporaries(options.out);  // what a run that was killed left
   leakage::leave_out(config, digests_, scratch_ ? scratch_->folder() : options.out, options.quiet, ingest_);
-  if (!options_.quiet) {
-    run::log_info(fmt::format("{} in {}",
-                              run::counted(static_cast<std::int64_t>(ingest_.candidates.size()), "candidate"),
-                              run::counted(static_cast<std::int64_t>(ingest_.units.size()), "unit")));
-  }
-  for (const candidates::IngestNote& note : ingest_.notes) {
-    const bool is_caution = note.kind == loaders::formats::NoteKind::caution;
-    if (is_caution || !options_.quiet) run::log_note(note.line());
-  }
+  log_candidates(static_cast<std::int64_t>(ingest_.candidates.size()),
+                 static_cast<std::int64_t>(ingest_.units.size()), options_.quiet);
+  if (use != Use::join) log_notes(ingest_.notes, options_.quiet);
   if (!options_.quiet && config::needs_network(config) &&
       origins_.domain.pictures == device::Pictures::unknown) {
     run::log_note(

@@ -4,10 +4,12 @@
 
 #include <tbb/global_control.h>
 
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "manifests/digest.h"
 #include "manifests/lock.h"
@@ -24,18 +26,24 @@ namespace q3d::pipeline::build {
 // Returns how many threads RunOptions::threads asks for: 0 means one for each core.
 std::size_t flow_threads(int wanted);
 
+// What every run says of its candidates: their number, unless it is quiet, and the notes.
+void log_candidates(std::int64_t candidates, std::int64_t units, bool quiet);
+void log_notes(const std::vector<candidates::IngestNote>& notes, bool quiet);
+
 class Workspace {
  public:
   enum class Use : std::uint8_t {
     work,  // makes the output folder, holds its lock, keeps what it digests and finds
     look,  // writes nothing into it; what is digested and found is kept in a scratch folder until the end
+    join,  // writes units' files into it, beside a process of Use::work, which keeps lock and digests and
+           // speaks
   };
 
   // Takes the folder's lock, digests the assets and ingests the datasets. Throws ConfigError,
   // std::runtime_error, Interrupted.
   Workspace(const config::BuildConfig& config, const run::RunOptions& options, Use use = Use::work);
 
-  // Of Use::work.
+  // Of Use::work and Use::join.
   const std::filesystem::path& out() const { return options_.out; }
   const candidates::Ingest& ingest() const { return ingest_; }
   const stages::AssetDigests& assets() const { return assets_; }

@@ -64,6 +64,7 @@ int run_build(const Arguments& arguments) {
   request.command = command_words(arguments);
   if (!arguments.until.empty()) request.until = stages::stage_from_string(arguments.until);
   const build::BuildSummary summary = build::build(configured(arguments), arguments.run, request);
+  if (summary.rank != 0) return 0;  // rank 0 speaks for all
   if (summary.stopped_after) {
     print_stop(summary, arguments.run.out);
   } else {
@@ -94,6 +95,7 @@ void partial_options(CLI::App& command, Arguments& arguments) {
 
 Command add_build(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
+  arguments->run.shares_units = true;
   CLI::App* command = declare(app, "build");
   config_option(*command, arguments->config)->required();
   device_option(*command, arguments->config);
@@ -121,9 +123,11 @@ Command add_build(CLI::App& app) {
       "  quadruped3d build -c my.json -c out/thresholds.json -o out --dry-run\n"
       "  quadruped3d build -c my.json -c out/thresholds.json -o out --until predict\n"
       "  quadruped3d build -c configs/world_pools/animal3d.json -o out/pools/animal3d\n"
+      "  torchrun --no-python --nproc-per-node 4 quadruped3d build -c my.json -c out/thresholds.json -o out\n"
       "If a build was stopped or killed, run the same command again: it continues where it left off and\n"
-      "ends with the same bytes. Bad pictures and records never stop a build; they are counted and listed\n"
-      "with their reasons in verdicts.csv.\n"
+      "ends with the same bytes. The ranks that torchrun or srun starts share the units, each with a GPU or\n"
+      "a part of the cores, and publish the same bytes as one process (docs/scale.md). Bad pictures and\n"
+      "records never stop a build; they are counted and listed with their reasons in verdicts.csv.\n"
       "Pseudo labels need thresholds in the config; `quadruped3d calibrate` finds them. Datasets of the\n"
       "role \"truth\" or \"2d_only\" bring their own labels and need neither thresholds nor a network\n"
       "(docs/config.md).");

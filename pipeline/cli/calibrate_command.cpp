@@ -98,6 +98,7 @@ nlohmann::ordered_json to_json(const build::CalibrationSummary& summary) {
 
 Command add_calibrate(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
+  arguments->run.shares_units = true;
   CLI::App* command = declare(app, "calibrate");
   config_option(*command, arguments->config)->required();
   device_option(*command, arguments->config);
@@ -123,6 +124,7 @@ Command add_calibrate(CLI::App& app) {
   return [arguments] {
     const build::CalibrationSummary summary = build::calibrate(
         config::load_build_config(arguments->config.files, arguments->config.settings()), arguments->run);
+    if (summary.rank != 0) return 0;  // rank 0 speaks for all
     if (!arguments->write.empty()) build::write_thresholds(arguments->write, summary);
     if (!arguments->figure.empty()) {
       manifests::write_file_atomically(arguments->figure, report::calibration_figure(summary.pools));

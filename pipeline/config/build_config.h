@@ -44,6 +44,8 @@ struct NetworkConfig {
   int batch = 8;  // crops in one forward pass; batches never cross a unit
   int compute_threads =
       0;  // threads of one CPU operator; 0 = as the network's size suggests. Part of the key.
+  int local_rank =
+      0;  // of processes that share a machine; no key of the config. It chooses the GPU of "auto" and "cuda".
 };
 
 struct TtaConfig {

@@ -73,10 +73,10 @@ torch::Tensor stack_patches(std::span<const device::PatchView> patches) {
 }
 
 // The description of the device counts the threads, so they are set first.
-model::DeviceChoice choose_device(const std::string& name, int threads) {
+model::DeviceChoice choose_device(const config::NetworkConfig& network, int threads) {
   model::configure_compute(threads);
   try {
-    return model::choose_device(name);
+    return model::choose_device(network.device, network.local_rank);
   } catch (const std::invalid_argument& error) {
     throw run::ConfigError(error.what());
   }
@@ -113,7 +113,7 @@ class TorchNetwork : public device::Network {
         predict_batch_(static_cast<std::size_t>(network.batch)),
         adapt_batch_(static_cast<std::size_t>(tta.batch)),
         options_(tta_options(tta)),
-        device_(choose_device(network.device, threads_)),
+        device_(choose_device(network, threads_)),
         prima_(model::Prima::load(
             network.checkpoint, network.smal_asset, device_.device,
             network.dtype == config::Dtype::bfloat16 ? torch::kBFloat16 : torch::kFloat32)) {
@@ -206,7 +206,7 @@ int compute_threads(const config::NetworkConfig& network) {
 }
 
 std::string device_key(const config::NetworkConfig& network) {
-  const model::DeviceChoice choice = choose_device(network.device, compute_threads(network));
+  const model::DeviceChoice choice = choose_device(network, compute_threads(network));
   const std::string kind =
       choice.device.is_cpu() ? fmt::format("cpu-{}", compute_threads(network)) : std::string("cuda");
   return kind + ", " + model::arithmetic_of(choice);

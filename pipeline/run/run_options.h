@@ -13,6 +13,7 @@ struct RunOptions {
   // Take every unit through the stages, also those of a dataset that is up to date, and leave `latest` as it
   // is.
   bool rebuild = false;
+  bool shares_units = false;  // with the ranks that torchrun or srun has started, if it has
 };
 
 }  // namespace q3d::pipeline::run

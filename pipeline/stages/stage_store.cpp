@@ -8,15 +8,16 @@
 #include "manifests/digest.h"
 #include "manifests/file_descriptor.h"
 #include "pipeline/run/log.h"
+#include "pipeline/stages/rank_journals.h"
 #include "pipeline/stages/stages.h"
 
 namespace q3d::pipeline::stages {
 namespace {
 
 std::filesystem::path opened(const std::filesystem::path& out, const std::string& stage,
-                             const std::string& key) {
+                             const std::string& key, int rank) {
   std::filesystem::path folder = stage_folder(out, stage, key);
-  open_stage_folder(folder, stage, key);
+  if (rank == 0) open_stage_folder(folder, stage, key);
   return folder;
 }
 
@@ -27,13 +28,43 @@ std::filesystem::path unit_file(const std::filesystem::path& folder, std::int64_
 }
 
 StageStore::StageStore(const std::filesystem::path& out, const std::string& stage, const std::string& key,
-                       std::string candidates::Unit::*digest)
-    : folder_(opened(out, stage, key)), digest_(digest), journal_(folder_ / "journal.jsonl") {
+                       std::string candidates::Unit::*digest, RankOfStore rank)
+    : folder_(opened(out, stage, key, rank.rank)),
+      digest_(digest),
+      rank_(std::move(rank)),
+      journal_(folder_ / "journal.jsonl") {
+  if (rank_.rank > 0) {
+    own_journal_.emplace(rank_journal(folder_, rank_.run, rank_.rank));
+    return;
+  }
   for (const std::int64_t line : journal_.damaged_lines()) {
     run::log_warning(fmt::format(
         "{}, line {}: damaged (its checksum or its fields do not match); the unit it stood for is made again",
         (folder_ / "journal.jsonl").string(), line));
   }
+  take_over(find_rank_journals(folder_));
+}
+
+void StageStore::take_over(const std::vector<std::filesystem::path>& files) {
+  if (files.empty()) return;
+  adopt_rank_journals(folder_, files, journal_);
+  journal_.write_anew();
+  for (const std::filesystem::path& file : files) std::filesystem::remove(file);
+}
+
+void StageStore::take_over_ranks() {
+  // By their names, because a network file system may not list new files yet.
+  std::vector<std::filesystem::path> files;
+  for (int rank = 1; rank < rank_.ranks; ++rank) {
+    std::filesystem::path file = rank_journal(folder_, rank_.run, rank);
+    if (std::filesystem::exists(file)) files.push_back(std::move(file));
+  }
+  const std::lock_guard lock(mutex_);
+  for (const std::filesystem::path& file : files) {
+    const manifests::Journal of_rank(file);
+    for (const auto& [unit, entry] : of_rank.entries()) compared_.insert(unit);
+  }
+  take_over(files);
 }
 
 std::filesystem::path StageStore::file(const candidates::Unit& unit) const {
@@ -125,7 +156,12 @@ void StageStore::save(const candidates::Unit& unit, std::int64_t rows,
   entry.bytes = static_cast<std::int64_t>(std::filesystem::file_size(file(unit)));
   entry.rows = rows;
   const std::lock_guard lock(mutex_);
-  journal_.append(entry);
+  if (own_journal_) {
+    own_journal_->append(entry);
+    journal_.adopt(entry);
+  } else {
+    journal_.append(entry);
+  }
   compared_.insert(unit.index);
 }
 

@@ -8,6 +8,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "manifests/journal.h"
 #include "manifests/table.h"
@@ -18,15 +19,24 @@ namespace q3d::pipeline::stages {
 // A unit's file in a stage's folder.
 std::filesystem::path unit_file(const std::filesystem::path& folder, std::int64_t unit);
 
+// The part of a store that is a rank's own, where several ranks share a build.
+struct RankOfStore {
+  std::string run;  // a word of this run, the same for all its ranks; empty in a run of one process
+  int rank = 0;
+  int ranks = 1;
+};
+
 // A file of an earlier run is used only after its bytes were compared with the SHA-256 that the journal
 // holds. A unit whose file is gone or damaged counts as not finished, and a warning names it. Thread-safe:
 // one thread may save units while others ask for them.
 class StageStore {
  public:
-  // Opens or makes <out>/stages/<stage>-<key>/. `digest` is what of a unit its file depends on. Throws as
+  // Opens or makes <out>/stages/<stage>-<key>/, and takes over what ranks of a killed run have left in
+  // journals of their own. Only rank 0 does so; the other ranks must open the store after it, and keep their
+  // lines in a journal of their own. `digest` is what of a unit its file depends on. Throws as
   // open_stage_folder, and manifests::IoError.
   StageStore(const std::filesystem::path& out, const std::string& stage, const std::string& key,
-             std::string candidates::Unit::*digest = &candidates::Unit::input_digest);
+             std::string candidates::Unit::*digest = &candidates::Unit::input_digest, RankOfStore rank = {});
 
   // Returns whether the unit is finished. The first call of a run reads the unit's file whole. Throws
   // manifests::IoError when a file that is there cannot be read; so do the next two.
@@ -45,16 +55,23 @@ class StageStore {
 
   std::filesystem::path file(const candidates::Unit& unit) const;
 
+  // For rank 0, when the other ranks have ended their work: their lines become lines of journal.jsonl. What
+  // they made in this run is not read again.
+  void take_over_ranks();
+
  private:
   std::optional<manifests::JournalEntry> claimed(const candidates::Unit& unit);
   bool accept(const candidates::Unit& unit, const std::string& expected, const std::string& got);
   void give_up(const candidates::Unit& unit, const std::string& why);
+  void take_over(const std::vector<std::filesystem::path>& files);
 
   std::filesystem::path folder_;
   std::string candidates::Unit::*digest_;
+  RankOfStore rank_;
   std::mutex mutex_;  // guards what follows
   manifests::Journal journal_;
-  std::set<std::int64_t> compared_;  // units whose file this run has compared or written
+  std::optional<manifests::Journal> own_journal_;  // of a rank other than 0
+  std::set<std::int64_t> compared_;                // units whose file this run has compared or written
 };
 
 }  // namespace q3d::pipeline::stages

@@ -3,13 +3,16 @@
 #include <system_error>
 
 #include "manifests/digest.h"
+#include "pipeline/stages/rank_journals.h"
 #include "pipeline/stages/stage_store.h"
 #include "pipeline/stages/stages.h"
 
 namespace q3d::pipeline::stages {
 
 StageView::StageView(const std::filesystem::path& out, const std::string& stage, const std::string& key)
-    : folder_(stage_folder(out, stage, key)), journal_(folder_ / "journal.jsonl") {}
+    : folder_(stage_folder(out, stage, key)), journal_(folder_ / "journal.jsonl") {
+  adopt_rank_journals(folder_, find_rank_journals(folder_), journal_);
+}
 
 bool StageView::exists() const {
   return std::filesystem::exists(manifest());

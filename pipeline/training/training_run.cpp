@@ -77,11 +77,6 @@ model::ranks::RankPlace find_place() {
   }
 }
 
-// Ranks of one machine share its cores.
-int own_cores(const model::ranks::RankPlace& place) {
-  return std::max(1, static_cast<int>(std::thread::hardware_concurrency()) / place.local_size);
-}
-
 model::DeviceChoice choose_device(const TrainingNetworkConfig& network,
                                   const model::ranks::RankPlace& place) {
   model::configure_compute(network.compute_threads > 0 ? network.compute_threads : own_cores(place));

@@ -5,13 +5,19 @@
 #include <atomic>
 #include <exception>
 #include <mutex>
+#include <optional>
 
 #include "pipeline/run/interrupt.h"
 
 namespace q3d::pipeline::unit {
 namespace {
 
-using Item = std::shared_ptr<UnitWork>;
+// A unit and its turn, for units need not be claimed in order.
+struct Turn {
+  std::size_t number = 0;
+  std::shared_ptr<UnitWork> work;
+};
+using Item = std::shared_ptr<Turn>;
 
 // The first exception of any node; once there is one, items pass through untouched so that the graph drains.
 class FirstFailure {
@@ -47,36 +53,42 @@ void run_units(const UnitFlow& flow, device::DeviceWorker& device) {
   tf::graph graph;
 
   std::int64_t next = 0;
+  const auto in_order = [&]() -> std::optional<std::int64_t> {
+    return next < flow.units ? std::optional(next++) : std::nullopt;
+  };
+  std::size_t turns = 0;
   tf::input_node<Item> read(graph, [&](tbb::flow_control& control) -> Item {
     Item item;
-    if (next < flow.units) failure.guard([&] { item = flow.read(next++); });
+    failure.guard([&] {
+      const std::optional<std::int64_t> unit = flow.claim ? flow.claim() : in_order();
+      if (unit) item = std::make_shared<Turn>(Turn{turns++, flow.read(*unit)});
+    });
     if (!item) control.stop();
     return item;
   });
   tf::limiter_node<Item> in_flight(graph, static_cast<std::size_t>(flow.units_in_flight));
   tf::function_node<Item, Item> decode(graph, tf::unlimited, [&](const Item& item) {
-    failure.guard([&] { flow.decode(*item); });
+    failure.guard([&] { flow.decode(*item->work); });
     return item;
   });
   DeviceNode compute(graph, tf::unlimited, [&](const Item& item, DeviceNode::gateway_type& gateway) {
     gateway.reserve_wait();
     device.post([&, item] {
-      failure.guard([&] { flow.compute(*item); });
+      failure.guard([&] { flow.compute(*item->work); });
       gateway.try_put(item);
       gateway.release_wait();
     });
   });
   tf::function_node<Item, Item> encode(graph, tf::unlimited, [&](const Item& item) {
     failure.guard([&] {
-      if (flow.encode) flow.encode(*item);
+      if (flow.encode) flow.encode(*item->work);
     });
     return item;
   });
-  tf::sequencer_node<Item> in_order(
-      graph, [](const Item& item) { return static_cast<std::size_t>(item->unit->index); });
+  tf::sequencer_node<Item> by_turn(graph, [](const Item& item) { return item->number; });
   tf::function_node<Item, tf::continue_msg> write(graph, tf::serial, [&](const Item& item) {
-    failure.guard([&] { flow.write(*item); });
-    item->decoded.clear();
+    failure.guard([&] { flow.write(*item->work); });
+    item->work->decoded.clear();
     return tf::continue_msg();
   });
 
@@ -84,8 +96,8 @@ void run_units(const UnitFlow& flow, device::DeviceWorker& device) {
   tf::make_edge(in_flight, decode);
   tf::make_edge(decode, compute);
   tf::make_edge(compute, encode);
-  tf::make_edge(encode, in_order);
-  tf::make_edge(in_order, write);
+  tf::make_edge(encode, by_turn);
+  tf::make_edge(by_turn, write);
   tf::make_edge(write, in_flight.decrementer());
   read.activate();
   graph.wait_for_all();

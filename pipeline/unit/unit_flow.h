@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 
 #include "pipeline/device/device_worker.h"
 #include "pipeline/unit/unit_work.h"
@@ -16,7 +17,11 @@ namespace q3d::pipeline::unit {
 struct UnitFlow {
   std::int64_t units = 0;
   int units_in_flight = 3;  // bounds memory: decoded pictures of that many units at most
-  // Makes the item of unit i, with what an earlier run left. Called in order, one at a time.
+  // Gives the unit to make next; nothing ends the run. Called one at a time. If empty, all units are made in
+  // order.
+  std::function<std::optional<std::int64_t>()> claim;
+  // Makes the item of unit i, with what an earlier run left. Called in the order of the claims, one at a
+  // time.
   std::function<std::shared_ptr<UnitWork>(std::int64_t)> read;
   // Called concurrently for several units.
   std::function<void(UnitWork&)> decode;
@@ -24,7 +29,7 @@ struct UnitFlow {
   std::function<void(UnitWork&)> compute;
   // Called concurrently for several units, after compute. May be empty.
   std::function<void(UnitWork&)> encode;
-  // Called in unit order, one at a time.
+  // Called in the order of the claims, one at a time.
   std::function<void(UnitWork&)> write;
 };
 

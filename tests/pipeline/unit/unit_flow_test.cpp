@@ -95,6 +95,20 @@ TEST(UnitFlow, ARunWithoutEncodingWritesAllTheSame) {
   EXPECT_EQ(recorder.written.size(), 4U);
 }
 
+TEST(UnitFlow, ClaimedUnitsAreWrittenInTheOrderOfTheClaims) {
+  Recorder recorder(7);
+  recorder.flow.claim = [units =
+                             std::vector<std::int64_t>{5, 0, 3}]() mutable -> std::optional<std::int64_t> {
+    if (units.empty()) return std::nullopt;
+    const std::int64_t unit = units.front();
+    units.erase(units.begin());
+    return unit;
+  };
+  device::DeviceWorker device;
+  run_units(recorder.flow, device);
+  EXPECT_EQ(recorder.written, (std::vector<std::int64_t>{5, 0, 3}));
+}
+
 TEST(UnitFlow, NoUnitsIsNoWork) {
   Recorder recorder(0);
   device::DeviceWorker device;

@@ -1,0 +1,97 @@
+// One process's part in a run that several ranks share: torchrun or srun starts the same command several
+// times, the ranks meet in a store, and each takes units until none is left. Rank 0 leads: it holds the
+// output folder's lock, reads the candidates first, takes the lines of all journals over, publishes, and
+// speaks for all.
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <thread>
+
+#include "model/ranks/rank_place.h"
+#include "model/ranks/shared_store.h"
+#include "model/ranks/unit_claims.h"
+#include "pipeline/config/build_config.h"
+#include "pipeline/device/device_worker.h"
+#include "pipeline/run/run_options.h"
+#include "pipeline/stages/stage_store.h"
+#include "pipeline/unit/unit_flow.h"
+
+namespace q3d::pipeline::build {
+
+// Rank 0 cannot be reached any more. What this rank had open is finished.
+class LeaderLost : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+class RankShare {
+ public:
+  // The ranks are those of the environment if options.shares_units is set, else this process is alone. Rank 0
+  // waits for nobody. Throws ConfigError, also for a network on the CPU without a number of compute_threads,
+  // and std::runtime_error when rank 0 is not reached in time.
+  RankShare(const config::BuildConfig& config, const run::RunOptions& options, const std::string& purpose);
+  ~RankShare();
+  RankShare(const RankShare&) = delete;
+  RankShare& operator=(const RankShare&) = delete;
+
+  bool is_shared() const { return place_.size > 1; }
+  bool leads() const { return place_.rank == 0; }
+  int rank() const { return place_.rank; }
+
+  // The config with this rank's GPU, and the options with its part of the machine's cores; only rank 0 is
+  // loud.
+  const config::BuildConfig& config() const { return config_; }
+  const run::RunOptions& options() const { return options_; }
+
+  // Rank 0 digests the pictures; the others read the candidates when its digests are there. The others wait
+  // in the first function until rank 0 calls the second. Returns false if rank 0 has called end() instead:
+  // nothing is to be done. Throws LeaderLost and Interrupted.
+  bool await_digests();
+  void tell_digests();
+
+  // All ranks call it before the first unit, rank 0 after it has opened the stages' folders; returns rank 0's
+  // `is_done`. `key` names the work. Throws ConfigError if rank 0 has another, LeaderLost and Interrupted.
+  bool agree(const std::string& key, bool is_done);
+
+  // Whose lines go where. For ranks other than 0 it is complete after agree().
+  stages::RankOfStore of_store() const;
+
+  using Count = std::function<model::ranks::Tally(const unit::UnitWork&)>;
+  using TellOthers = std::function<void(const model::ranks::Tally&)>;
+  // Makes units until no rank that lives has an open one. `count` gives a finished unit's numbers, and
+  // `tell_others`, in rank 0, hears from time to time their sum over the other ranks, on a thread of its own.
+  // Throws LeaderLost, Interrupted, and what the flow throws.
+  void make(unit::UnitFlow flow, device::DeviceWorker& device, const Count& count, TellOthers tell_others);
+
+  // Rank 0 has nothing more for the others to do.
+  void end();
+
+ private:
+  void keep_alive(const std::stop_token& stop);
+  std::optional<std::string> await_word(const std::string& key);
+  std::optional<std::int64_t> claim(std::int64_t units);
+  void pause();
+  void say_farewell();
+
+  model::ranks::RankPlace place_;
+  config::BuildConfig config_;
+  run::RunOptions options_;
+  std::string run_;
+  std::unique_ptr<model::ranks::SharedStore> store_;  // null when alone
+  std::unique_ptr<model::ranks::UnitClaims> claims_;
+  std::atomic<bool> is_store_lost_ = false;
+  std::atomic<bool> is_over_ = false;  // rank 0 needs no more units
+  std::mutex mutex_;
+  std::condition_variable_any woken_;
+  TellOthers tell_others_;  // guarded by mutex_
+  std::jthread life_;       // the last member: it uses the others
+};
+
+}  // namespace q3d::pipeline::build
