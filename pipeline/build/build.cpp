@@ -7,11 +7,14 @@
 #include <memory>
 #include <utility>
 
+#include "manifests/lock.h"
 #include "pipeline/build/publish.h"
 #include "pipeline/build/quality.h"
 #include "pipeline/build/rank_share.h"
 #include "pipeline/build/unit_builder.h"
+#include "pipeline/build/up_to_date.h"
 #include "pipeline/build/workspace.h"
+#include "pipeline/network/torch_network.h"
 #include "pipeline/run/log.h"
 
 namespace q3d::pipeline::build {
@@ -86,6 +89,29 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
+// Names the device in the build's keys. A missing checkpoint is told when it is read.
+std::string device_of(const config::BuildConfig& config) {
+  const bool has_network =
+      config::needs_network(config) && std::filesystem::exists(config.network.checkpoint);
+  return has_network ? network::device_key(config.network) : std::string();
+}
+
+// Fills the summary from the record of an earlier build if nothing has changed since.
+bool is_unchanged(const run::RunOptions& options, const UpToDateRecord& record, BuildSummary& summary) {
+  auto found = record.unchanged();
+  if (!found) return false;
+  log_candidates(found->candidates, found->units, options.quiet);
+  log_notes(found->notes, options.quiet);
+  summary.was_up_to_date = true;
+  summary.folder = std::move(found->folder);
+  summary.notes = std::move(found->notes);
+  const std::string version = summary.folder.filename().string();
+  for (stages::BuildPlan& plan : stages::read_build_plans(options.out)) {
+    if (stages::version_name(plan.name, plan.keys) == version) summary.plan = std::move(plan);
+  }
+  return true;
+}
+
 // Tells what a finished dataset is worth, and makes it the newest. The caller holds the folder's lock.
 void finish(const run::RunOptions& options, BuildSummary& summary, Clock::time_point start) {
   summary.dataset = dataset::read_dataset_manifest(summary.folder);
@@ -104,6 +130,13 @@ BuildSummary build(const config::BuildConfig& config, const run::RunOptions& opt
   RankShare ranks(config, options, "build");
   BuildSummary summary;
   summary.rank = ranks.rank();
+  const UpToDateRecord record(options.out, config, rules, device_of(config));
+  if (ranks.leads() && !options.rebuild && is_unchanged(options, record, summary)) {
+    ranks.end();
+    const manifests::FolderLock lock(options.out);
+    finish(options, summary, start);
+    return summary;
+  }
   if (!ranks.await_digests()) return summary;
   Workspace workspace(ranks.config(), ranks.options(),
                       ranks.leads() ? Workspace::Use::work : Workspace::Use::join);
@@ -126,6 +159,7 @@ BuildSummary build(const config::BuildConfig& config, const run::RunOptions& opt
     summary.seconds = seconds_since(start);
     return summary;
   }
+  record.keep(workspace.ingest(), summary.folder);
   finish(options, summary, start);
   return summary;
 }

@@ -178,6 +178,7 @@ Ingest ingest(const config::BuildConfig& config, manifests::DigestCache& digests
     auto [dataset, digest] = read_dataset(options, digests);
     const std::string name = options.name + "/" + options.split;
     result.annotation_digests[name] = std::move(digest);
+    result.files.insert(result.files.end(), dataset.files.begin(), dataset.files.end());
     if (is_rendered(options.root)) result.rendered.insert(name);
     if (result.corrections) apply_corrections(*result.corrections, dataset.records);
     for (auto& record : dataset.records) check_role(options.role, record);

@@ -1,0 +1,53 @@
+// Says whether a build has nothing to do, without reading what it would read.
+//
+// A build that ends with a finished dataset leaves a record, <out>/stages/builds/<digest of the
+// request>.stamps: the stamps of all that it read (pictures, masks, annotation files, weights, the program
+// itself), of every folder in which a picture could appear, and of the dataset's own files, at the moment
+// when their bytes were compared with their digests. As long as all stamps are the same, the same request
+// would end with the same dataset.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pipeline/candidates/ingest.h"
+#include "pipeline/config/build_config.h"
+#include "pipeline/config/judging_rules.h"
+
+namespace q3d::pipeline::build {
+
+class UpToDateRecord {
+ public:
+  // Of the request that this config is, on this device. What is found later belongs to this moment or an
+  // earlier one.
+  UpToDateRecord(const std::filesystem::path& out, const config::BuildConfig& config,
+                 const config::JudgingRules& rules, const std::string& device_key);
+
+  struct Unchanged {
+    std::filesystem::path folder;  // of the finished dataset
+    std::vector<candidates::IngestNote> notes;
+    std::int64_t candidates = 0;
+    std::int64_t units = 0;
+  };
+  // What the request ends with if nothing has changed. A record that is damaged counts as none. Throws
+  // manifests::IoError.
+  std::optional<Unchanged> unchanged() const;
+
+  // Keeps the stamps, if they can be trusted: no input was changed since this object was made. A build whose
+  // datasets are compared with test sets has no record. `folder` holds the finished dataset; its bytes were
+  // just compared or written. Throws manifests::IoError.
+  void keep(const candidates::Ingest& ingest, const std::filesystem::path& folder) const;
+
+ private:
+  std::optional<std::vector<std::string>> inputs(const candidates::Ingest& ingest) const;
+
+  std::filesystem::path out_;
+  const config::BuildConfig& config_;
+  std::string request_;  // digest
+  std::int64_t begun_ns_ = 0;
+};
+
+}  // namespace q3d::pipeline::build
