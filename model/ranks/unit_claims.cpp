@@ -140,6 +140,11 @@ UnitClaims::Remainder UnitClaims::remainder() {
     longest = std::max(longest, word.longest);
     copied.insert(copied.end(), word.copied.begin(), word.copied.end());
   }
+  {
+    // What counts is how soon this rank would make the unit. The slow rank's own times say nothing of that.
+    const std::lock_guard lock(mutex_);
+    if (longest_.count() > 0.0) longest = longest_;
+  }
   const ClaimSeconds slow = std::max(rules_.least_slow, longest * rules_.slow_factor);
   Remainder result{std::nullopt, true};
   for (int rank = 0; rank < ranks_; ++rank) {

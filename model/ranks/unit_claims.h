@@ -3,8 +3,8 @@
 // A unit is given to the first rank that asks. Every rank keeps one word in the store: the units that it has
 // open, and a number that grows as long as it lives. When all units are given away, a rank without work reads
 // these words. It makes a unit of another rank once more when that rank has died, or has had the unit open
-// for far longer than any unit took. Two ranks that make one unit write the same bytes, so neither disturbs
-// the other, and a rank that is slow or dead holds nobody.
+// for far longer than its own units took. Two ranks that make one unit write the same bytes, so neither
+// disturbs the other, and a rank that is slow or dead holds nobody.
 #pragma once
 
 #include <array>
@@ -25,9 +25,10 @@ using ClaimClock = std::chrono::steady_clock;
 using ClaimSeconds = std::chrono::duration<double>;
 
 struct ClaimRules {
-  ClaimSeconds beat{1.0};         // between two signs of life; claims_rules() lengthens it for many ranks
-  double lost_after_beats = 15;   // a rank without a sign of life for so long has died
-  double slow_factor = 3.0;       // a unit is slow that is open for so many times the longest unit's time ...
+  ClaimSeconds beat{1.0};        // between two signs of life; claims_rules() lengthens it for many ranks
+  double lost_after_beats = 15;  // a rank without a sign of life for so long has died
+  double slow_factor =
+      3.0;  // a unit is slow that is open for so many times the longest of the idle rank's units ...
   ClaimSeconds least_slow{10.0};  // ... and at least for this long
 };
 

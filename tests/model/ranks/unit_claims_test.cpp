@@ -144,6 +144,19 @@ TEST_F(UnitClaimsTest, ASlowRankHoldsNobody) {
   EXPECT_TRUE(rank(1).remainder().is_finished);  // though rank 2 still has it open
 }
 
+TEST_F(UnitClaimsTest, ASlowRanksOwnTimesDoNotExcuseIt) {
+  start(2);
+  ASSERT_EQ(rank(0).next(3), 0);
+  pass(seconds(4));
+  rank(0).finish(0, {});
+  ASSERT_EQ(rank(1).next(3), 1);
+  pass(seconds(100));
+  rank(1).finish(1, {});
+  ASSERT_EQ(rank(1).next(3), 2);
+  pass(seconds(13));  // three times the 4 s of rank 0
+  EXPECT_EQ(rank(0).remainder().unit, 2);
+}
+
 TEST_F(UnitClaimsTest, ACopyWhoseFirstMakingEndedHoldsNobody) {
   start(3);
   ASSERT_EQ(rank(2).next(1), 0);
