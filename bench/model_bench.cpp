@@ -1,8 +1,10 @@
 // Speed of prediction and of test-time adaptation. Names read <what>/<size>/<dtype>/<batch>, for instance
 //   model_bench --benchmark_filter='/small/'
 //   OMP_NUM_THREADS=2 model_bench --benchmark_filter='/vith/bfloat16/'
-// "items" are images for Predict, and iterations times images for Adapt. peak_GB is the process's largest
-// resident size up to then. Weights are seeded, the body is the synthetic quadruped, the device is `auto`.
+// "items" are images for Predict, and iterations times images for Adapt. CPU time is that of all threads.
+// MatrixRate multiplies matrices as the full-size ViT does, by LibTorch's linear and by packed matrices: its
+// rate of operations bounds the others. peak_GB is the process's largest resident size up to then. Weights
+// are seeded, the body is the synthetic quadruped, the device is `auto`.
 #include <benchmark/benchmark.h>
 #include <sys/resource.h>
 
@@ -13,6 +15,7 @@
 #include "model/device.h"
 #include "model/init.h"
 #include "model/net.h"
+#include "model/packed_matrix.h"
 #include "model/prima.h"
 #include "model/tta.h"
 #include "pipeline/animal/synthetic_quadruped.h"
@@ -41,6 +44,7 @@ const Prima& network(const Setting& setting) {
     initialise(*net, 1);
     net->eval();
     for (auto& parameter : net->parameters()) parameter.set_requires_grad(false);
+    net->pack();
     held = std::make_unique<Prima>(
         net, smal::tensors::SmalBody(pipeline::animal::make_synthetic_quadruped(), device));
     held_name = name;
@@ -86,11 +90,42 @@ void adapt_instances(benchmark::State& state, const Setting& setting) {
   report(state, batch * kAdaptIterations);
 }
 
+// The first matrix of the ViT's perceptrons, for 8 pictures of 193 tokens.
+void matrix_rate(benchmark::State& state, torch::ScalarType dtype, bool is_packed) {
+  constexpr std::int64_t kRows = 8 * 193, kIn = 1280, kOut = 5120;
+  configure_compute(at::get_num_threads());
+  const at::NoGradGuard no_gradients;
+  const torch::Tensor x = torch::rand({kRows, kIn}).to(dtype);
+  const torch::Tensor weight = torch::rand({kOut, kIn}).to(dtype);
+  const torch::Tensor bias = torch::rand({kOut}).to(dtype);
+  if (is_packed && !packs_matrices(torch::kCPU, dtype)) {
+    state.SkipWithError("matrices are not packed on this processor");
+    return;
+  }
+  const PackedMatrix packed = is_packed ? PackedMatrix(weight, bias) : PackedMatrix();
+  for (auto _ : state) {
+    const torch::Tensor product = is_packed ? packed.multiply(x) : torch::linear(x, weight, bias);
+    benchmark::DoNotOptimize(product.data_ptr());
+  }
+  state.counters["flop"] = benchmark::Counter(static_cast<double>(2 * kRows * kIn * kOut),
+                                              benchmark::Counter::kIsIterationInvariantRate);
+}
+
 [[maybe_unused]] const bool kRegistered = [] {
   for (const std::string size : {"small", "vith"}) {
     for (const auto& [dtype, name] :
          {std::pair{torch::kFloat32, "float32"}, {torch::kBFloat16, "bfloat16"}}) {
       const Setting setting{size, dtype};
+      for (const bool is_packed : {false, true}) {
+        if (size != "vith") continue;
+        const std::string how = is_packed ? "packed" : "linear";
+        benchmark::RegisterBenchmark(
+            ("MatrixRate/" + how + "/" + name).c_str(),
+            [dtype = dtype, is_packed](benchmark::State& state) { matrix_rate(state, dtype, is_packed); })
+            ->Unit(benchmark::kMillisecond)
+            ->MeasureProcessCPUTime()
+            ->UseRealTime();
+      }
       for (const auto& [what, run] : {std::pair{"Predict", &predict}, {"Adapt", &adapt_instances}}) {
         benchmark::RegisterBenchmark((std::string(what) + "/" + size + "/" + name).c_str(),
                                      [setting, run = run](benchmark::State& state) { run(state, setting); })
@@ -98,6 +133,7 @@ void adapt_instances(benchmark::State& state, const Setting& setting) {
             ->Arg(4)
             ->Arg(8)
             ->Unit(benchmark::kMillisecond)
+            ->MeasureProcessCPUTime()
             ->UseRealTime();
       }
     }

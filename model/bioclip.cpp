@@ -19,8 +19,9 @@ class ClipMlp : public torch::nn::Module {
   }
 
   torch::Tensor forward(const torch::Tensor& x) const {
+    if (!quick_gelu_) return c_proj_->forward(c_fc_->forward(x, Activation::gelu));
     const torch::Tensor hidden = c_fc_->forward(x);
-    return c_proj_->forward(quick_gelu_ ? hidden * torch::sigmoid(1.702 * hidden) : torch::gelu(hidden));
+    return c_proj_->forward(hidden * torch::sigmoid(1.702 * hidden));
   }
 
  private:

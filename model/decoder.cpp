@@ -55,6 +55,19 @@ torch::Tensor sample_grid(const torch::Tensor& source, const torch::Tensor& xy, 
   return torch::bmm((down * across).flatten(2).to(source.scalar_type()), source);
 }
 
+// apply_mlp for one set of weights an instance, with leaves in place of the biases.
+torch::Tensor apply_taped(const MlpWeights& weights, const torch::Tensor& x, MlpTape& tape) {
+  MlpWeights taped = weights;
+  taped.hidden_bias = weights.hidden_bias.detach().requires_grad_();
+  taped.out_bias = weights.out_bias.detach().requires_grad_();
+  const torch::Tensor hidden = torch::relu(affine_each(x, taped.hidden_weight, taped.hidden_bias));
+  tape.inputs.push_back(x.detach());
+  tape.hidden_biases.push_back(taped.hidden_bias);
+  tape.hidden.push_back(hidden.detach());
+  tape.out_biases.push_back(taped.out_bias);
+  return affine_each(hidden, taped.out_weight, taped.out_bias);
+}
+
 }  // namespace
 
 // Post-norm: self-attention, cross-attention to the image, feed-forward.
@@ -76,17 +89,17 @@ class DecoderLayer : public torch::nn::Module {
     norm3_ = register_module("norm3", norm());
   }
 
-  torch::Tensor project_keys_values(const torch::Tensor& image_tokens) const {
+  KeysValues project_keys_values(const torch::Tensor& image_tokens) const {
     return cross_attn_->project_keys_values(image_tokens);
   }
 
   // tokens (B, N, D) -> (B, queries, D): the first `queries` tokens only, or all when it is 0.
-  torch::Tensor forward(const torch::Tensor& tokens, const torch::Tensor& keys_values,
+  torch::Tensor forward(const torch::Tensor& tokens, const KeysValues& keys_values,
                         std::int64_t queries) const {
     const torch::Tensor kept = queries == 0 ? tokens : tokens.narrow(1, 0, queries);
     torch::Tensor x = norm1_->forward(kept + drop(self_attn_->self_attention(tokens, queries)));
     x = norm2_->forward(x + drop(cross_attn_->cross_attention(x, keys_values)));
-    const torch::Tensor hidden = drop(torch::gelu(ffn_in_->forward(x)));
+    const torch::Tensor hidden = drop(ffn_in_->forward(x, Activation::gelu));
     return norm3_->forward(x + drop(ffn_out_->forward(hidden)));
   }
 
@@ -170,8 +183,7 @@ DecoderMemory Decoder::remember(const torch::Tensor& image_tokens, const Observe
   for (const auto& layer : layers_) memory.keys_values.push_back(layer->project_keys_values(placed));
   // Bilinear sampling is linear, so the projection of samples may come before the sampling; its bias may not,
   // because outside the grid the weights do not sum to 1.
-  const Linear& projection = *keypoint_2d_feat_linear_;
-  memory.sampled = torch::linear(placed.to(projection.weight.scalar_type()), projection.weight);
+  memory.sampled = keypoint_2d_feat_linear_->multiply(placed);
   return memory;
 }
 
@@ -251,7 +263,11 @@ torch::Tensor Decoder::initial_tokens(const DecoderOutput& estimate,
 }
 
 DecoderOutput Decoder::refine(const DecoderMemory& memory, const torch::Tensor& initial_betas,
-                              const AdaptedParameters& parameters, const Observer& observe) const {
+                              const AdaptedParameters& parameters, const Observer& observe,
+                              HeadTapes* tapes) const {
+  const auto apply = [](const MlpWeights& head, const torch::Tensor& x, MlpTape* tape) {
+    return tape == nullptr ? apply_mlp(head, x) : apply_taped(head, x, *tape);
+  };
   const std::int64_t batch = initial_betas.size(0);
   DecoderOutput estimate;
   estimate.pose_6d = init_pose_.expand({batch, -1});
@@ -265,9 +281,10 @@ DecoderOutput Decoder::refine(const DecoderMemory& memory, const torch::Tensor& 
     const std::string prefix = "ief" + std::to_string(round) + "_";
     const torch::Tensor tokens = initial_tokens(estimate, parameters);
     const torch::Tensor readout = run_layers(tokens, memory, estimate, prefix, observe);
-    const torch::Tensor pose_change = apply_mlp(parameters.pose_head, readout);
-    const torch::Tensor betas_change = apply_mlp(parameters.shape_head, readout);
-    const torch::Tensor camera_change = apply_mlp(parameters.camera_head, readout);
+    const torch::Tensor pose_change = apply(parameters.pose_head, readout, tapes ? &tapes->pose : nullptr);
+    const torch::Tensor betas_change = apply(parameters.shape_head, readout, tapes ? &tapes->shape : nullptr);
+    const torch::Tensor camera_change =
+        apply(parameters.camera_head, readout, tapes ? &tapes->camera : nullptr);
     if (observe) {
       observe(prefix + "param_token_in", tokens.select(1, 0));
       observe(prefix + "param_token_out", readout);

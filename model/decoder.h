@@ -30,8 +30,8 @@ struct AdaptedParameters {
 
 // All that the decoder layers need of an image, computed once however often they run.
 struct DecoderMemory {
-  std::vector<torch::Tensor> keys_values;  // a layer: (B, 192, 2 D)
-  torch::Tensor sampled;                   // (B, 192, D): image tokens as they enter the 2D keypoint tokens
+  std::vector<KeysValues> keys_values;  // a layer: each (B, heads, 192, D / heads)
+  torch::Tensor sampled;                // (B, 192, D): image tokens as they enter the 2D keypoint tokens
 };
 
 struct DecoderOutput {
@@ -40,6 +40,17 @@ struct DecoderOutput {
   torch::Tensor camera;            // (B, 3) = (s, tx, ty)
   torch::Tensor aux_keypoints_2d;  // (B, 26, 2) crop units: the last update's; zeros without keypoint tokens
   torch::Tensor aux_keypoints_3d;  // (B, 26, 3): not centred
+};
+
+// A perceptron's passes, one a round: what entered its two matrices, and copies of its biases that are leaves
+// of the graph. The gradient of a matrix is the sum over the rounds of outer products of a bias's gradient
+// and its input, so that it need not be written out.
+struct MlpTape {
+  std::vector<torch::Tensor> inputs, hidden_biases;  // (B, in), (B, hidden)
+  std::vector<torch::Tensor> hidden, out_biases;     // (B, hidden), (B, out)
+};
+struct HeadTapes {
+  MlpTape pose, shape, camera;
 };
 
 class DecoderLayer;
@@ -58,9 +69,10 @@ class Decoder : public torch::nn::Module {
 
   AdaptedParameters own_parameters() const;
 
-  // All iterative-error-feedback rounds. initial_betas (B, 41).
+  // All iterative-error-feedback rounds. initial_betas (B, 41). With `tapes`, the heads are noted there.
   DecoderOutput refine(const DecoderMemory& memory, const torch::Tensor& initial_betas,
-                       const AdaptedParameters& parameters, const Observer& observe = {}) const;
+                       const AdaptedParameters& parameters, const Observer& observe = {},
+                       HeadTapes* tapes = nullptr) const;
 
  private:
   struct KeypointUpdate;

@@ -17,6 +17,8 @@
 #include <optional>
 #include <stdexcept>
 
+#include "model/packed_matrix.h"
+
 namespace q3d::model {
 namespace {
 
@@ -139,8 +141,8 @@ std::string limits_of_the_environment() {
 std::string arithmetic_of(const DeviceChoice& choice) {
   std::string machine;
   if (choice.device.is_cpu()) {
-    machine = fmt::format("{}, kernels {}{}", cpu_instructions(), at::get_cpu_capability(),
-                          limits_of_the_environment());
+    machine = fmt::format("{}, kernels {}{}{}", cpu_instructions(), at::get_cpu_capability(),
+                          packing_name().empty() ? "" : ", " + packing_name(), limits_of_the_environment());
   } else {
     machine = cuda_device_name(choice.device.has_index() ? choice.device.index() : 0);
   }

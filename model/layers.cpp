@@ -1,5 +1,6 @@
 #include "model/layers.h"
 
+#include <cmath>
 #include <vector>
 
 namespace q3d::model {
@@ -10,21 +11,70 @@ torch::Tensor affine(const torch::Tensor& x, const torch::Tensor& weight, const 
   return torch::linear(x.to(weight.scalar_type()), weight, bias);
 }
 
-// The same with weight (out, in), or (B, out, in) for x (B, in).
+// Frees a parameter's numbers. It stays in the module under its name.
+void release(torch::Tensor& parameter) {
+  parameter.set_data(torch::empty({0}, parameter.options()));
+}
+
+// (B, N, width) -> (B, heads, N, width / heads).
+torch::Tensor split_heads(const torch::Tensor& x, std::int64_t heads) {
+  return x.unflatten(2, {heads, -1}).transpose(1, 2);
+}
+
+torch::Tensor join_heads(const torch::Tensor& x) {
+  return x.transpose(1, 2).flatten(2);
+}
+
+// Attention as two products and a softmax. On a CPU it is faster than LibTorch's fused kernel for bfloat16,
+// which oneDNN multiplies, and for gradients, which the fused kernel computes for keys and values too where
+// nobody needs them.
+torch::Tensor attend_by_products(const torch::Tensor& query, const torch::Tensor& key,
+                                 const torch::Tensor& value) {
+  const double scale = 1.0 / std::sqrt(static_cast<double>(query.size(-1)));
+  const auto stacked = [](const torch::Tensor& x) { return x.flatten(0, 1); };  // (B heads, N, width / heads)
+  const torch::Tensor scores = torch::bmm(stacked(query * scale), stacked(key).transpose(1, 2));
+  return torch::bmm(scores.softmax(-1), stacked(value)).unflatten(0, {query.size(0), query.size(1)});
+}
+
+// query (B, heads, N, d), key and value (B, heads, M, d) -> (B, heads, N, d).
+torch::Tensor attend_by_heads(const torch::Tensor& query, const torch::Tensor& key,
+                              const torch::Tensor& value, double dropout) {
+  const bool has_constant_keys = at::GradMode::is_enabled() && query.requires_grad() && !key.requires_grad();
+  const bool is_bfloat16 = query.scalar_type() == torch::kBFloat16;
+  if (query.is_cpu() && dropout == 0.0 && (has_constant_keys || is_bfloat16)) {
+    return attend_by_products(query, key, value);
+  }
+  return at::scaled_dot_product_attention(query, key, value, std::nullopt, dropout);
+}
+
+}  // namespace
+
 torch::Tensor affine_each(const torch::Tensor& x, const torch::Tensor& weight, const torch::Tensor& bias) {
   if (weight.dim() == 2) return affine(x, weight, bias);
   return torch::baddbmm(bias.unsqueeze(2), weight, x.unsqueeze(2)).squeeze(2);
 }
-
-}  // namespace
 
 Linear::Linear(std::int64_t in, std::int64_t out, const Placement& placement) {
   weight = register_parameter("weight", torch::empty({out, in}, placement.matrix()));
   bias = register_parameter("bias", torch::empty({out}, placement.matrix()));
 }
 
-torch::Tensor Linear::forward(const torch::Tensor& x) const {
-  return affine(x, weight, bias);
+torch::Tensor Linear::forward(const torch::Tensor& x, Activation activation) const {
+  if (packed_.defined()) {
+    TORCH_CHECK(!is_training(), "a packed matrix cannot learn: load_net gives a network that can");
+    return packed_.multiply(x.to(packed_.dtype()), activation);
+  }
+  return activate(affine(x, weight, bias), activation);
+}
+
+torch::Tensor Linear::multiply(const torch::Tensor& x) const {
+  if (packed_.defined()) return packed_.multiply_without_bias(x.to(packed_.dtype()));
+  return torch::linear(x.to(weight.scalar_type()), weight);
+}
+
+void Linear::pack() {
+  packed_ = PackedMatrix(weight, bias);
+  release(weight);
 }
 
 LayerNorm::LayerNorm(std::int64_t width, double epsilon, const Placement& placement) : epsilon_(epsilon) {
@@ -51,12 +101,8 @@ torch::Tensor PatchConv::forward(const torch::Tensor& images) const {
 
 torch::Tensor attend(const torch::Tensor& query, const torch::Tensor& key, const torch::Tensor& value,
                      std::int64_t heads, double dropout) {
-  const auto split = [heads](const torch::Tensor& x) {  // (B, N, width) -> (B, heads, N, width / heads)
-    return x.unflatten(2, {heads, -1}).transpose(1, 2);
-  };
-  const torch::Tensor mixed =
-      at::scaled_dot_product_attention(split(query), split(key), split(value), std::nullopt, dropout);
-  return mixed.transpose(1, 2).flatten(2);
+  return join_heads(attend_by_heads(split_heads(query, heads), split_heads(key, heads),
+                                    split_heads(value, heads), dropout));
 }
 
 MultiheadAttention::MultiheadAttention(std::int64_t width, std::int64_t heads, double dropout,
@@ -74,28 +120,44 @@ torch::Tensor MultiheadAttention::project(const torch::Tensor& x, std::int64_t f
                 in_proj_bias_.narrow(0, first * width_, count * width_));
 }
 
-torch::Tensor MultiheadAttention::attend_and_mix(const torch::Tensor& query, const torch::Tensor& key,
-                                                 const torch::Tensor& value) const {
-  return out_proj_->forward(attend(query, key, value, heads_, is_training() ? dropout_ : 0.0));
+torch::Tensor MultiheadAttention::project_queries(const torch::Tensor& x) const {
+  return queries_.defined() ? queries_.multiply(x.to(queries_.dtype())) : project(x, 0, 1);
+}
+
+torch::Tensor MultiheadAttention::project_memory(const torch::Tensor& x) const {
+  return memory_.defined() ? memory_.multiply(x.to(memory_.dtype())) : project(x, 1, 2);
 }
 
 torch::Tensor MultiheadAttention::self_attention(const torch::Tensor& tokens, std::int64_t queries) const {
-  if (queries == 0) {
-    const auto parts = project(tokens, 0, 3).chunk(3, 2);
-    return attend_and_mix(parts[0], parts[1], parts[2]);
+  std::vector<torch::Tensor> parts;
+  if (queries == 0 && !queries_.defined()) {
+    parts = project(tokens, 0, 3).chunk(3, 2);
+  } else {
+    parts = project_memory(tokens).chunk(2, 2);
+    parts.insert(parts.begin(), project_queries(queries == 0 ? tokens : tokens.narrow(1, 0, queries)));
   }
-  const auto parts = project(tokens, 1, 2).chunk(2, 2);
-  return attend_and_mix(project(tokens.narrow(1, 0, queries), 0, 1), parts[0], parts[1]);
+  return out_proj_->forward(attend(parts[0], parts[1], parts[2], heads_, dropout()));
 }
 
-torch::Tensor MultiheadAttention::project_keys_values(const torch::Tensor& source) const {
-  return project(source, 1, 2);
+KeysValues MultiheadAttention::project_keys_values(const torch::Tensor& source) const {
+  const auto parts = project_memory(source).chunk(2, 2);
+  return {split_heads(parts[0], heads_).contiguous(), split_heads(parts[1], heads_).contiguous()};
 }
 
 torch::Tensor MultiheadAttention::cross_attention(const torch::Tensor& tokens,
-                                                  const torch::Tensor& keys_values) const {
-  const auto parts = keys_values.chunk(2, 2);
-  return attend_and_mix(project(tokens, 0, 1), parts[0], parts[1]);
+                                                  const KeysValues& keys_values) const {
+  const torch::Tensor query = split_heads(project_queries(tokens), heads_);
+  return out_proj_->forward(
+      join_heads(attend_by_heads(query, keys_values.keys, keys_values.values, dropout())));
+}
+
+void MultiheadAttention::pack() {
+  const auto part = [&](const torch::Tensor& rows, std::int64_t first, std::int64_t count) {
+    return rows.narrow(0, first * width_, count * width_);
+  };
+  queries_ = PackedMatrix(part(in_proj_weight_, 0, 1), part(in_proj_bias_, 0, 1));
+  memory_ = PackedMatrix(part(in_proj_weight_, 1, 2), part(in_proj_bias_, 1, 2));
+  release(in_proj_weight_);
 }
 
 torch::Tensor apply_mlp(const MlpWeights& weights, const torch::Tensor& x, double negative_slope) {
@@ -112,7 +174,8 @@ Mlp::Mlp(std::int64_t in, std::int64_t hidden, std::int64_t out, const Placement
 }
 
 torch::Tensor Mlp::forward(const torch::Tensor& x) const {
-  return apply_mlp(weights(), x, negative_slope_);
+  if (negative_slope_ == 0.0) return out_->forward(hidden_->forward(x, Activation::relu));
+  return out_->forward(torch::leaky_relu(hidden_->forward(x), negative_slope_));
 }
 
 MlpWeights Mlp::weights() const {

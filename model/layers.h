@@ -12,6 +12,8 @@
 #include <functional>
 #include <string>
 
+#include "model/packed_matrix.h"
+
 namespace q3d::model {
 
 struct Placement {
@@ -32,10 +34,18 @@ using Observer = std::function<void(const std::string& name, const torch::Tensor
 class Linear : public torch::nn::Module {
  public:
   Linear(std::int64_t in, std::int64_t out, const Placement& placement);
-  torch::Tensor forward(const torch::Tensor& x) const;  // (..., in) -> (..., out) in the matrix's dtype
+  // (..., in) -> (..., out) in the matrix's dtype.
+  torch::Tensor forward(const torch::Tensor& x, Activation activation = Activation::none) const;
+  // x W^T alone, without the bias.
+  torch::Tensor multiply(const torch::Tensor& x) const;
+  // Packs the weight and empties the parameter, so that the numbers are held once. The layer is frozen then.
+  void pack();
 
-  torch::Tensor weight;  // (out, in)
+  torch::Tensor weight;  // (out, in), or empty once packed
   torch::Tensor bias;    // (out)
+
+ private:
+  PackedMatrix packed_;
 };
 
 class LayerNorm : public torch::nn::Module {
@@ -68,6 +78,11 @@ class PatchConv : public torch::nn::Module {
 torch::Tensor attend(const torch::Tensor& query, const torch::Tensor& key, const torch::Tensor& value,
                      std::int64_t heads, double dropout = 0.0);
 
+// Projected keys and values by heads: each (B, heads, M, width / heads).
+struct KeysValues {
+  torch::Tensor keys, values;
+};
+
 // The attention of torch.nn.MultiheadAttention, under its parameter names. Keys and values can be projected
 // once and used for many queries.
 class MultiheadAttention : public torch::nn::Module {
@@ -77,18 +92,23 @@ class MultiheadAttention : public torch::nn::Module {
   // tokens (B, N, width) attend to each other -> (B, queries, width): the first `queries` tokens only, or all
   // when it is 0.
   torch::Tensor self_attention(const torch::Tensor& tokens, std::int64_t queries = 0) const;
-  // source (B, M, width) -> (B, M, 2 width): keys, then values.
-  torch::Tensor project_keys_values(const torch::Tensor& source) const;
+  // source (B, M, width) -> keys and values.
+  KeysValues project_keys_values(const torch::Tensor& source) const;
   // tokens (B, N, width) attend to projected keys and values -> (B, N, width).
-  torch::Tensor cross_attention(const torch::Tensor& tokens, const torch::Tensor& keys_values) const;
+  torch::Tensor cross_attention(const torch::Tensor& tokens, const KeysValues& keys_values) const;
+
+  // Packs the projections of queries, and of keys and values, as Linear::pack does.
+  void pack();
 
  private:
+  torch::Tensor project_queries(const torch::Tensor& x) const;  // (B, N, width)
+  torch::Tensor project_memory(const torch::Tensor& x) const;   // (B, M, 2 width): keys, then values
   torch::Tensor project(const torch::Tensor& x, std::int64_t first, std::int64_t count) const;
-  torch::Tensor attend_and_mix(const torch::Tensor& query, const torch::Tensor& key,
-                               const torch::Tensor& value) const;
+  double dropout() const { return is_training() ? dropout_ : 0.0; }
 
-  torch::Tensor in_proj_weight_;  // (3 width, width): query, key, value rows
+  torch::Tensor in_proj_weight_;  // (3 width, width): query, key, value rows; empty once packed
   torch::Tensor in_proj_bias_;
+  PackedMatrix queries_, memory_;
   std::shared_ptr<Linear> out_proj_;
   std::int64_t width_;
   std::int64_t heads_;
@@ -100,6 +120,9 @@ class MultiheadAttention : public torch::nn::Module {
 struct MlpWeights {
   torch::Tensor hidden_weight, hidden_bias, out_weight, out_bias;
 };
+
+// x W^T + b with weight (out, in) and x (..., in), or with weight (B, out, in) and x (B, in).
+torch::Tensor affine_each(const torch::Tensor& x, const torch::Tensor& weight, const torch::Tensor& bias);
 
 // x (..., in) for shared weights or (B, in) for one set an instance -> (..., out). ReLU between, leaking
 // `negative_slope` of negative values.

@@ -1,5 +1,7 @@
 #include "model/net.h"
 
+#include <set>
+
 namespace q3d::model {
 namespace {
 
@@ -26,6 +28,24 @@ ImageFeatures PrimaNet::encode(const torch::Tensor& images, const Observer& obse
   features.image_tokens = image_tokens(images, observe);
   features.bio_token = bioclip_->forward(images, observe);
   return features;
+}
+
+void PrimaNet::pack() {
+  if (!packs_matrices(placement_.device, placement_.matrix_dtype)) return;
+  const AdaptedParameters adapted = decoder_->own_parameters();
+  std::set<const void*> kept;
+  for (const MlpWeights* head : {&adapted.pose_head, &adapted.shape_head, &adapted.camera_head}) {
+    kept.insert(head->hidden_weight.unsafeGetTensorImpl());
+    kept.insert(head->out_weight.unsafeGetTensorImpl());
+  }
+  const at::NoGradGuard no_grad;
+  for (const auto& module : modules(/*include_self=*/false)) {
+    if (auto* linear = module->as<Linear>()) {
+      if (!kept.contains(linear->weight.unsafeGetTensorImpl())) linear->pack();
+    } else if (auto* attention = module->as<MultiheadAttention>()) {
+      attention->pack();
+    }
+  }
 }
 
 }  // namespace q3d::model

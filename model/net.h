@@ -27,6 +27,10 @@ class PrimaNet : public torch::nn::Module {
   // images as above -> (B, 192, embed_dim): the backbone on the crop's middle columns alone.
   torch::Tensor image_tokens(const torch::Tensor& images, const Observer& observe = {}) const;
 
+  // Packs the matrices that nothing changes any more, where packs_matrices says so: all but those that
+  // adaptation copies for its instances. The network must be frozen and in evaluation mode.
+  void pack();
+
   const PrimaConfig& config() const { return config_; }
   const Placement& placement() const { return placement_; }
   const Vit& backbone() const { return *backbone_; }

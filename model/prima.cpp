@@ -61,6 +61,7 @@ Prima Prima::load(const std::filesystem::path& checkpoint, const std::filesystem
   auto net = load_net(file, checkpoint_config(file), asset, {device, dtype});
   net->eval();
   for (auto& parameter : net->parameters()) parameter.set_requires_grad(false);
+  net->pack();
   const torch::ScalarType body_dtype = net->placement().vector_dtype();
   return {std::move(net), smal::tensors::SmalBody(asset, device).to_dtype(body_dtype)};
 }

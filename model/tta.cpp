@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <stdexcept>
 #include <utility>
 
@@ -128,6 +129,7 @@ void check_arguments(const Prima& prima, const ImageFeatures& features, const to
     require(std::isfinite(weight) && weight >= 0.0, fmt::format("a prior's weight {}", weight));
   }
   require(!uses_priors(options) || options.priors, "prior terms without priors");
+  require(options.slots >= 0, fmt::format("{} slots", options.slots));
   require(std::is_sorted(options.snapshots.begin(), options.snapshots.end()) &&
               (options.snapshots.empty() || options.snapshots.front() >= 0),
           "snapshots must be ascending and 0 or more");
@@ -149,10 +151,12 @@ class Adaptation {
       : prima_(prima),
         schedules_(schedules),
         options_(options),
+        features_(features),
+        total_(static_cast<std::int64_t>(schedules.size())),
         holds_out_(std::any_of(schedules.begin(), schedules.end(), filters::adaptation::holds_out)),
         initial_betas_(decoder().initial_betas(features.bio_token)),
-        slots_(decoder().own_parameters(), decoder().remember(features.image_tokens), initial_betas_.clone(),
-               make_targets(keypoints, schedules, initial_betas_.options())) {
+        targets_(make_targets(keypoints, schedules, initial_betas_.options())),
+        slots_(decoder().own_parameters(), options.slots > 0 ? std::min(options.slots, total_) : total_) {
     result_.l_proj.resize(schedules.size());
     result_.held_out.resize(schedules.size());
     result_.loss.resize(schedules.size());
@@ -160,61 +164,104 @@ class Adaptation {
   }
 
   TtaResult run() {
+    fill_slots();
     while (slots_.size() > 0) advance();
-    result_.best = assemble(prima_.net(), prima_.body(), unpack(best_), initial_betas_, false);
-    result_.last = assemble(prima_.net(), prima_.body(), unpack(last_), initial_betas_, false);
-    while (snapshots_.size() < options_.snapshots.size()) snapshots_.push_back(last_);
-    for (const torch::Tensor& rows : snapshots_) {
-      result_.snapshots.push_back(assemble(prima_.net(), prima_.body(), unpack(rows), initial_betas_, false));
-    }
+    const auto assembled = [&](const torch::Tensor& rows) {
+      return assemble(prima_.net(), prima_.body(), unpack(rows), initial_betas_, false);
+    };
+    result_.best = assembled(best_);
+    result_.last = assembled(last_);
+    for (const torch::Tensor& rows : snapshots_) result_.snapshots.push_back(assembled(rows));
     return std::move(result_);
   }
 
  private:
   const Decoder& decoder() const { return prima_.net().decoder(); }
 
-  // Measures the present iterate, lets go of the instances that stop there and steps the others.
-  void advance() {
-    const bool may_step = any_step_left();
-    const auto leaves = slots_.parameters(may_step);
-    const Iterate iterate = evaluate(leaves, may_step);
-    const std::vector<bool> goes_on = record(iterate);
-    while (snapshots_.size() < options_.snapshots.size() && options_.snapshots[snapshots_.size()] == taken_) {
-      snapshots_.push_back(last_.clone());
-    }
-    ++taken_;
-    if (std::find(goes_on.begin(), goes_on.end(), true) != goes_on.end()) {
-      // The gradient of the sum of losses: no operation mixes instances, so each one's stays its own.
-      slots_.step(gradients(iterate.loss, leaves), options_.learning_rate);
-    }
-    for (std::int64_t slot = slots_.size() - 1; slot >= 0; --slot) {
-      if (!goes_on[static_cast<std::size_t>(slot)]) slots_.remove(slot);
-    }
+  // Instances take the free slots in their order.
+  void fill_slots() {
+    const std::int64_t count = std::min(slots_.capacity() - slots_.size(), total_ - started_);
+    if (count == 0) return;
+    const auto part = [&](const torch::Tensor& rows) { return rows.narrow(0, started_, count); };
+    std::vector<std::int64_t> instances(static_cast<std::size_t>(count));
+    std::iota(instances.begin(), instances.end(), started_);
+    slots_.add(instances,
+               {decoder().remember(part(features_.image_tokens)),
+                part(initial_betas_),
+                {part(targets_.xy), part(targets_.visible), part(targets_.held_out), part(targets_.fitted)}});
+    started_ += count;
   }
 
-  // Zeros where a leaf has no part in the loss: the embeddings of a network without keypoint tokens.
-  static std::vector<torch::Tensor> gradients(const torch::Tensor& loss,
-                                              const std::vector<torch::Tensor>& leaves) {
-    auto result =
+  // Measures the present iterates, steps the instances and replaces those that end here.
+  void advance() {
+    HeadTapes tapes;
+    const bool may_step = any_step_left();
+    const AdaptedParameters parameters = slots_.parameters(may_step);
+    const Iterate iterate = evaluate(parameters, may_step ? &tapes : nullptr);
+    const std::vector<bool> goes_on = record(iterate);
+    if (std::find(goes_on.begin(), goes_on.end(), true) != goes_on.end()) {
+      slots_.step(gradients(iterate.loss, parameters, tapes), options_.learning_rate);
+    }
+    const std::int64_t before = slots_.size();
+    for (std::int64_t slot = before - 1; slot >= 0; --slot) {
+      if (!goes_on[static_cast<std::size_t>(slot)]) slots_.remove(slot);
+    }
+    finished_ += before - slots_.size();
+    if (options_.progress && slots_.size() < before) options_.progress(finished_);
+    fill_slots();
+  }
+
+  // The gradient of the sum of losses: no operation mixes instances, so each one's stays its own. The tensors
+  // are in the order of to_list, and undefined where a leaf has no part in the loss: the embeddings of a
+  // network without keypoint tokens.
+  static std::vector<InstanceGradient> gradients(const torch::Tensor& loss,
+                                                 const AdaptedParameters& parameters,
+                                                 const HeadTapes& tapes) {
+    std::vector<torch::Tensor> leaves{parameters.keypoint_2d_embeddings, parameters.keypoint_3d_embeddings};
+    const std::vector<const MlpTape*> heads{&tapes.pose, &tapes.shape, &tapes.camera};
+    for (const MlpTape* head : heads) {
+      leaves.insert(leaves.end(), head->hidden_biases.begin(), head->hidden_biases.end());
+      leaves.insert(leaves.end(), head->out_biases.begin(), head->out_biases.end());
+    }
+    const auto found =
         torch::autograd::grad({loss}, leaves, {torch::ones_like(loss)}, /*retain_graph=*/std::nullopt,
                               /*create_graph=*/false, /*allow_unused=*/true);
-    for (std::size_t i = 0; i < leaves.size(); ++i) {
-      if (!result[i].defined()) result[i] = torch::zeros_like(leaves[i]);
+    std::vector<InstanceGradient> result;
+    std::size_t next = 0;
+    for (; next < 2; ++next) {
+      result.push_back({found[next].defined() ? found[next] : torch::zeros_like(leaves[next]), {}});
+    }
+    // A matrix, then its bias, whose gradient is the sum over the rounds.
+    const auto take = [&](const std::vector<torch::Tensor>& inputs) {
+      InstanceGradient matrix, bias;
+      for (const torch::Tensor& input : inputs) {
+        const torch::Tensor& gradient = found[next++];
+        matrix.outer_products.emplace_back(gradient, input);
+        bias.dense = bias.dense.defined() ? bias.dense + gradient : gradient;
+      }
+      result.push_back(std::move(matrix));
+      result.push_back(std::move(bias));
+    };
+    for (const MlpTape* head : heads) {
+      take(head->inputs);
+      take(head->hidden);
     }
     return result;
   }
 
   bool any_step_left() const {
     for (std::int64_t slot = 0; slot < slots_.size(); ++slot) {
-      if (schedules_[static_cast<std::size_t>(slots_.instance(slot))].iterations > taken_) return true;
+      if (schedules_[static_cast<std::size_t>(slots_.instance(slot))].iterations > slots_.steps(slot))
+        return true;
     }
     return false;
   }
 
-  Iterate evaluate(const std::vector<torch::Tensor>& parameters, bool with_gradient) const {
-    const at::AutoGradMode mode(with_gradient);
+  // Without tapes, no gradients are computed.
+  Iterate evaluate(const AdaptedParameters& parameters, HeadTapes* tapes) const {
+    const at::AutoGradMode mode(tapes != nullptr);
     const DecoderOutput output =
-        decoder().refine(slots_.memory(), slots_.initial_betas(), from_list(parameters));
+        decoder().refine(slots_.memory(), slots_.initial_betas(), parameters, /*observe=*/{}, tapes);
     const torch::Tensor projected = projected_keypoints(prima_.body(), output, prima_.config().focal_px);
     const KeypointTargets targets = slots_.targets();
     Iterate iterate;
@@ -231,7 +278,7 @@ class Adaptation {
     return iterate;
   }
 
-  // Notes the iterate in the results -> per slot, whether the instance goes on.
+  // Notes the iterates in the results -> per slot, whether the instance goes on.
   std::vector<bool> record(const Iterate& iterate) {
     const torch::Tensor numbers =
         torch::stack({iterate.loss.detach(), iterate.l_proj, iterate.usable.to(iterate.l_proj.scalar_type()),
@@ -241,52 +288,82 @@ class Adaptation {
     std::vector<std::int64_t> accepted, improved;
     std::vector<bool> goes_on(static_cast<std::size_t>(slots_.size()), false);
     for (std::int64_t slot = 0; slot < slots_.size(); ++slot) {
-      if (rows[2][slot] == 0.0) continue;
+      const bool is_first = slots_.steps(slot) == 0;
+      const bool usable = rows[2][slot] != 0.0;
+      // An instance that cannot be measured keeps its prediction.
+      if (usable || is_first) accepted.push_back(slot);
+      if (is_first) improved.push_back(slot);
+      if (!usable) continue;
       const auto instance = static_cast<std::size_t>(slots_.instance(slot));
-      accepted.push_back(slot);
       result_.loss[instance].push_back(rows[0][slot]);
       result_.l_proj[instance].push_back(rows[1][slot]);
       const bool holds_out = filters::adaptation::holds_out(schedules_[instance]);
       if (holds_out) result_.held_out[instance].push_back(rows[3][slot]);
       const std::vector<double>& judged = holds_out ? result_.held_out[instance] : result_.l_proj[instance];
       int& best = result_.best_iteration[instance];
-      if (taken_ == 0 || judged.back() < judged[static_cast<std::size_t>(best)]) {
+      if (!is_first && judged.back() < judged[static_cast<std::size_t>(best)]) {
         improved.push_back(slot);
-        best = taken_;
+        best = static_cast<int>(slots_.steps(slot));
       }
       goes_on[static_cast<std::size_t>(slot)] =
           !filters::adaptation::is_finished(schedules_[instance], result_.l_proj[instance], best);
     }
-    if (taken_ == 0) {  // slots are still in the order of instances; unusable ones have nothing better
-      best_ = iterate.rows.clone();
-      last_ = iterate.rows.clone();
-    } else {
-      keep(last_, iterate.rows, accepted);
-      keep(best_, iterate.rows, improved);
-    }
+    if (!last_.defined()) make_rows(iterate.rows);
+    keep(last_, iterate.rows, accepted);
+    keep(best_, iterate.rows, improved);
+    take_snapshots(goes_on);
     return goes_on;
+  }
+
+  void make_rows(const torch::Tensor& like) {
+    last_ = torch::empty({total_, like.size(1)}, like.options());
+    best_ = torch::empty_like(last_);
+    for (std::size_t i = 0; i < options_.snapshots.size(); ++i)
+      snapshots_.push_back(torch::empty_like(last_));
+  }
+
+  // An instance that ends here shows its last iterate in the later snapshots too.
+  void take_snapshots(const std::vector<bool>& goes_on) {
+    for (std::size_t i = 0; i < snapshots_.size(); ++i) {
+      std::vector<std::int64_t> instances;
+      for (std::int64_t slot = 0; slot < slots_.size(); ++slot) {
+        const std::int64_t iterate = slots_.steps(slot);
+        const bool ends = !goes_on[static_cast<std::size_t>(slot)];
+        if (options_.snapshots[i] == iterate || (ends && options_.snapshots[i] > iterate)) {
+          instances.push_back(slots_.instance(slot));
+        }
+      }
+      if (instances.empty()) continue;
+      const torch::Tensor index = index_of(instances);
+      snapshots_[i].index_copy_(0, index, last_.index_select(0, index));
+    }
+  }
+
+  torch::Tensor index_of(const std::vector<std::int64_t>& values) const {
+    return torch::tensor(values, torch::kInt64).to(last_.device());
   }
 
   void keep(torch::Tensor& kept, const torch::Tensor& rows, const std::vector<std::int64_t>& slots) const {
     if (slots.empty()) return;
     std::vector<std::int64_t> instances;
     for (const std::int64_t slot : slots) instances.push_back(slots_.instance(slot));
-    const auto index = [&](const std::vector<std::int64_t>& values) {
-      return torch::tensor(values, torch::kInt64).to(rows.device());
-    };
-    kept.index_copy_(0, index(instances), rows.index_select(0, index(slots)));
+    kept.index_copy_(0, index_of(instances), rows.index_select(0, index_of(slots)));
   }
 
   const Prima& prima_;
   const std::vector<Schedule>& schedules_;
   const TtaOptions& options_;
+  const ImageFeatures& features_;
+  std::int64_t total_;           // instances
+  std::int64_t started_ = 0;     // of them have had a slot
+  std::int64_t finished_ = 0;    // of them have left theirs
   bool holds_out_;               // any instance does
-  torch::Tensor initial_betas_;  // (B, 41)
+  torch::Tensor initial_betas_;  // (total, 41)
+  KeypointTargets targets_;      // of all instances
   TtaSlots slots_;
-  torch::Tensor best_, last_;             // (B, 384) packed outputs
-  std::vector<torch::Tensor> snapshots_;  // likewise, of options_.snapshots so far
+  torch::Tensor best_, last_;             // (total, 384) packed outputs
+  std::vector<torch::Tensor> snapshots_;  // likewise, of options_.snapshots
   TtaResult result_;
-  int taken_ = 0;
 };
 
 }  // namespace

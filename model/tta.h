@@ -1,11 +1,13 @@
 // Test-time adaptation: per-instance refinement of the keypoint embeddings and the three regression heads
 // (4.5 M parameters at full size) against annotated 2D keypoints. Paper section "Test-time Adaptation";
 // official code: demo_tta.tta_optimize. Batched: each instance has its own parameters, Adam moments and
-// stopping rule.
+// stopping rule. When one is finished, the next one takes its place, so that the batch stays full.
 #pragma once
 
 #include <torch/types.h>
 
+#include <cstdint>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -32,6 +34,11 @@ struct TtaOptions {
   double shape_prior_weight = 0.0;
   std::optional<Priors> priors;
   std::vector<int> snapshots;  // iterates to keep beside the best and the last; ascending
+  // Instances that adapt at a time; 0 = all. Instances start in their order, and which of them share an
+  // iteration depends on schedules and numbers alone.
+  std::int64_t slots = 0;
+  std::function<void(std::int64_t finished)>
+      progress;  // told how many instances have ended, whenever some have
 };
 
 // L_proj: mean over visible keypoints and both coordinates of |projected - annotated|.

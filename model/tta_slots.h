@@ -1,10 +1,11 @@
-// The instances that are still adapting, packed into the first rows of every tensor they need.
+// The instances that are adapting at present, packed into the first rows of every tensor they need.
 #pragma once
 
 #include <torch/types.h>
 
 #include <vector>
 
+#include "model/adam.h"
 #include "model/decoder.h"
 
 namespace q3d::model {
@@ -18,23 +19,37 @@ struct KeypointTargets {
   torch::Tensor fitted;
 };
 
+// What a slot needs of its instance besides the parameters.
+struct SlotInputs {
+  DecoderMemory memory;
+  torch::Tensor initial_betas;
+  KeypointTargets targets;
+};
+
 class TtaSlots {
  public:
-  // Every instance gets a copy of the network's own parameters.
-  TtaSlots(const AdaptedParameters& initial, DecoderMemory memory, torch::Tensor initial_betas,
-           KeypointTargets targets);
+  // Room for `capacity` instances, none of which is there yet.
+  TtaSlots(const AdaptedParameters& initial, std::int64_t capacity);
 
+  std::int64_t capacity() const { return capacity_; }
   std::int64_t size() const { return static_cast<std::int64_t>(instances_.size()); }
   std::int64_t instance(std::int64_t slot) const { return instances_[static_cast<std::size_t>(slot)]; }
+  // Steps that the slot's instance has taken.
+  std::int64_t steps(std::int64_t slot) const { return steps_[static_cast<std::size_t>(slot)]; }
 
-  // Views of the active rows. Parameters share memory with the store, as leaves of a new graph.
-  std::vector<torch::Tensor> parameters(bool requires_grad) const;
+  // Adds instances behind those that are there, each with a copy of the network's own parameters. inputs: a
+  // row for each of them.
+  void add(const std::vector<std::int64_t>& instances, const SlotInputs& inputs);
+
+  // Views of the active rows. The embeddings share memory with the store, as leaves of a new graph; the heads
+  // need no gradients, because their tapes hold leaves.
+  AdaptedParameters parameters(bool embeddings_require_grad) const;
   DecoderMemory memory() const;
   torch::Tensor initial_betas() const;
   KeypointTargets targets() const;
 
-  // One Adam step of all active instances (0.9, 0.999, 1e-8, no weight decay).
-  void step(const std::vector<torch::Tensor>& gradients, double learning_rate);
+  // One Adam step of all active instances. Gradients in the order of to_list.
+  void step(const std::vector<InstanceGradient>& gradients, double learning_rate);
 
   // The last active instance takes the place of this one, which costs one row's copy.
   void remove(std::int64_t slot);
@@ -42,12 +57,12 @@ class TtaSlots {
  private:
   torch::Tensor active(const torch::Tensor& rows) const { return rows.narrow(0, 0, size()); }
 
+  std::int64_t capacity_;
+  std::vector<torch::Tensor> initial_;   // one set, in the order of to_list
   std::vector<std::int64_t> instances_;  // slot -> instance
-  std::vector<torch::Tensor> parameters_, first_moments_, second_moments_;
-  std::vector<torch::Tensor> step_counts_;  // one scalar a parameter, as the fused kernel wants them
-  DecoderMemory memory_;
-  torch::Tensor initial_betas_;
-  KeypointTargets targets_;
+  std::vector<std::int64_t> steps_;      // slot -> steps taken
+  std::vector<AdamState> states_;
+  SlotInputs inputs_;  // made by the first `add`
 };
 
 // The 14 tensors in a fixed order, and back.

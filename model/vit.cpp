@@ -34,7 +34,9 @@ class VitMlp : public torch::nn::Module {
     fc2_ = register_module("fc2", std::make_shared<Linear>(hidden, width, placement));
   }
 
-  torch::Tensor forward(const torch::Tensor& x) const { return fc2_->forward(torch::gelu(fc1_->forward(x))); }
+  torch::Tensor forward(const torch::Tensor& x) const {
+    return fc2_->forward(fc1_->forward(x, Activation::gelu));
+  }
 
  private:
   std::shared_ptr<Linear> fc1_;

@@ -138,6 +138,7 @@ TEST_P(ForwardParity, BFloat16IsNearFloat32) {
   auto net = load_net(testing::parity_file("weights_" + GetParam()), single.config(), asset,
                       {torch::kCPU, torch::kBFloat16});
   net->eval();
+  net->pack();
   const Prediction rough = predict(Prima(net, single.body()));
   EXPECT_EQ(rough.rotations.scalar_type(), torch::kFloat32);
   expect_close("rotations", rough.rotations, exact.rotations, 0.1);

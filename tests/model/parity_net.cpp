@@ -73,6 +73,7 @@ model::Prima parity_prima(const std::string& which, const model::PrimaConfig& co
   auto net = model::load_net(parity_file("weights_" + which), config, asset, {torch::kCPU, dtype});
   net->eval();
   for (auto& parameter : net->parameters()) parameter.set_requires_grad(false);
+  net->pack();
   return {net, smal::tensors::SmalBody(asset).to_dtype(dtype)};
 }
 
