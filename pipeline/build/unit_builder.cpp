@@ -122,7 +122,9 @@ void UnitBuilder::decode(unit::UnitWork& work) {
 // The paper's Stage 2 on one unit.
 void UnitBuilder::compute(unit::UnitWork& work) {
   const unit::NetworkSource network = [this]() -> device::Network& { return workspace_.network(); };
-  if (!work.predicted) unit::predict_unit(work, network, watch(config_.network.batch));
+  if (!work.predicted) {
+    unit::predict_unit(work, network, watch(config_.network.batch), makes(Stage::refine) ? &rules_ : nullptr);
+  }
   unit::judge_unit(work, rules_);
   if (makes(Stage::refine)) judge_and_refine(work, network);
   progress_.finish(work, was_done(work));
@@ -131,7 +133,7 @@ void UnitBuilder::compute(unit::UnitWork& work) {
 void UnitBuilder::judge_and_refine(unit::UnitWork& work, const unit::NetworkSource& network) {
   unit::free_unneeded_crops(work, rules_);
   if (!work.refined) {
-    unit::refine_unit(work, network, rules_, watch(config_.tta.batch));
+    unit::refine_unit(work, network, rules_, &progress_);
     unit::judge_unit(work, rules_);
   }
   if (measurements_ && !work.measured) {

@@ -2,7 +2,10 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -26,8 +29,19 @@ bool is_finite(const BodyPrediction& body);
 using smal::CropKeypoints;
 using PatchView = std::span<const std::uint8_t>;  // 256 x 256 x 3 RGB, row-major
 
+// What a network's encoders made of one picture. Only the network that made it can use it.
+class PictureFeatures {
+ public:
+  PictureFeatures() = default;
+  PictureFeatures(const PictureFeatures&) = delete;
+  PictureFeatures& operator=(const PictureFeatures&) = delete;
+  virtual ~PictureFeatures() = default;
+};
+using KeptFeatures = std::shared_ptr<const PictureFeatures>;
+
 struct AdaptRequest {
-  PatchView patch;
+  PatchView patch;        // not looked at if features are given
+  KeptFeatures features;  // of the same picture, from `predict`; or null
   CropKeypoints keypoints{};
   filters::adaptation::Schedule schedule;
 };
@@ -40,8 +54,8 @@ struct AdaptOutcome {
   std::vector<BodyPrediction> snapshots;  // of the iterates that were asked for
 };
 
-// A loaded network. One caller at a time. Batches are formed from consecutive elements of the span, so a
-// result depends on nothing but the span. pipeline/network makes one.
+// A loaded network. One caller at a time. Batches are formed from the elements of the span in their order, so
+// a result depends on nothing but the span. pipeline/network makes one.
 class Network {
  public:
   Network() = default;
@@ -49,11 +63,17 @@ class Network {
   Network& operator=(const Network&) = delete;
   virtual ~Network() = default;
 
-  virtual std::vector<BodyPrediction> predict(std::span<const PatchView> patches) = 0;
-  // `snapshots`: iterates to keep beside the best one, ascending; an instance that stopped before shows its
-  // last iterate.
+  // `features`, unless it is null, gets an entry for each patch: its features, or null where the network
+  // would make others of the same picture in another batch. So adaptation gives the same bits with kept
+  // features and without.
+  virtual std::vector<BodyPrediction> predict(std::span<const PatchView> patches,
+                                              std::vector<KeptFeatures>* features = nullptr) = 0;
+  // Adapts some requests at a time; when one ends, the next takes its place. `snapshots`: iterates to keep
+  // beside the best one, ascending; an instance that stopped before shows its last iterate. `progress` is
+  // told how many requests have ended, whenever some have.
   virtual std::vector<AdaptOutcome> adapt(std::span<const AdaptRequest> requests,
-                                          const std::vector<int>& snapshots = {}) = 0;
+                                          const std::vector<int>& snapshots = {},
+                                          const std::function<void(std::size_t ended)>& progress = {}) = 0;
 
   // "cpu (2 threads)", "cuda:0 NVIDIA H100 80GB HBM3": for people.
   virtual const std::string& device_description() const = 0;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <thread>
+#include <utility>
 
 #include "loaders/pictures/crop.h"
 #include "model/config.h"
@@ -105,6 +106,15 @@ model::Priors load_needed_priors(const std::filesystem::path& file, torch::Devic
   }
 }
 
+struct TorchFeatures : device::PictureFeatures {
+  explicit TorchFeatures(model::ImageFeatures of) : features(std::move(of)) {}
+  model::ImageFeatures features;  // a batch of one
+};
+
+model::ImageFeatures row_of(const model::ImageFeatures& batch, std::int64_t i) {
+  return {batch.image_tokens.narrow(0, i, 1), batch.bio_token.narrow(0, i, 1)};
+}
+
 class TorchNetwork : public device::Network {
  public:
   TorchNetwork(const config::NetworkConfig& network, const config::TtaConfig& tta,
@@ -120,15 +130,22 @@ class TorchNetwork : public device::Network {
     if (config::uses_priors(tta)) options_.priors = load_needed_priors(priors, device_.device);
   }
 
-  std::vector<device::BodyPrediction> predict(std::span<const device::PatchView> patches) override;
+  std::vector<device::BodyPrediction> predict(std::span<const device::PatchView> patches,
+                                              std::vector<device::KeptFeatures>* features) override;
   std::vector<device::AdaptOutcome> adapt(std::span<const device::AdaptRequest> requests,
-                                          const std::vector<int>& snapshots) override;
+                                          const std::vector<int>& snapshots,
+                                          const std::function<void(std::size_t)>& progress) override;
   const std::string& device_description() const override { return device_.description; }
   const std::string& device_warning() const override { return device_.warning; }
 
  private:
   // OpenMP's thread count belongs to the calling thread, so it is set wherever work begins.
   void begin() const { model::configure_compute(threads_); }
+  // On a CPU pictures are encoded one by one: that is as fast, since the matrices are packed, and a picture's
+  // features then depend on no other picture.
+  bool encodes_singly() const { return prima_.device().is_cpu(); }
+  model::ImageFeatures encode(std::span<const device::PatchView> patches) const;
+  model::ImageFeatures features_of(std::span<const device::AdaptRequest> requests) const;
 
   int threads_;
   std::size_t predict_batch_;
@@ -138,55 +155,89 @@ class TorchNetwork : public device::Network {
   model::Prima prima_;
 };
 
-std::vector<device::BodyPrediction> TorchNetwork::predict(std::span<const device::PatchView> patches) {
+model::ImageFeatures TorchNetwork::encode(std::span<const device::PatchView> patches) const {
+  const std::size_t step = encodes_singly() ? 1 : predict_batch_;
+  std::vector<torch::Tensor> image_tokens, bio_tokens;
+  for (std::size_t first = 0; first < patches.size(); first += step) {
+    const auto batch = patches.subspan(first, std::min(step, patches.size() - first));
+    const model::ImageFeatures some = prima_.encode(prima_.normalise(stack_patches(batch)));
+    image_tokens.push_back(some.image_tokens);
+    bio_tokens.push_back(some.bio_token);
+  }
+  return {torch::cat(image_tokens), torch::cat(bio_tokens)};
+}
+
+std::vector<device::BodyPrediction> TorchNetwork::predict(std::span<const device::PatchView> patches,
+                                                          std::vector<device::KeptFeatures>* features) {
   begin();
-  const c10::InferenceMode no_gradients;
+  const at::NoGradGuard no_gradients;
   std::vector<device::BodyPrediction> rows;
   rows.reserve(patches.size());
   for (std::size_t first = 0; first < patches.size(); first += predict_batch_) {
     const auto batch = patches.subspan(first, std::min(predict_batch_, patches.size() - first));
-    append_rows(prima_.predict(prima_.encode(prima_.normalise(stack_patches(batch)))), rows);
+    const model::ImageFeatures found = encode(batch);
+    append_rows(prima_.predict(found), rows);
+    if (features == nullptr) continue;
+    for (std::int64_t i = 0; i < found.bio_token.size(0); ++i) {
+      features->push_back(encodes_singly() ? std::make_shared<TorchFeatures>(row_of(found, i)) : nullptr);
+    }
   }
   return rows;
 }
 
+// Encodes the pictures whose features are not given.
+model::ImageFeatures TorchNetwork::features_of(std::span<const device::AdaptRequest> requests) const {
+  const at::NoGradGuard no_gradients;
+  std::vector<device::PatchView> patches;
+  for (const device::AdaptRequest& request : requests) {
+    if (!request.features) patches.push_back(request.patch);
+  }
+  model::ImageFeatures encoded;
+  if (!patches.empty()) encoded = encode(patches);
+  if (patches.size() == requests.size()) return encoded;
+  std::vector<torch::Tensor> image_tokens, bio_tokens;
+  std::int64_t next = 0;
+  for (const device::AdaptRequest& request : requests) {
+    const model::ImageFeatures one = request.features
+                                         ? dynamic_cast<const TorchFeatures&>(*request.features).features
+                                         : row_of(encoded, next++);
+    image_tokens.push_back(one.image_tokens);
+    bio_tokens.push_back(one.bio_token);
+  }
+  return {torch::cat(image_tokens), torch::cat(bio_tokens)};
+}
+
 std::vector<device::AdaptOutcome> TorchNetwork::adapt(std::span<const device::AdaptRequest> requests,
-                                                      const std::vector<int>& snapshots) {
+                                                      const std::vector<int>& snapshots,
+                                                      const std::function<void(std::size_t)>& progress) {
+  if (requests.empty()) return {};
   begin();
   model::TtaOptions options = options_;
   options.snapshots = snapshots;
+  options.slots = static_cast<std::int64_t>(adapt_batch_);
+  if (progress) {
+    options.progress = [&](std::int64_t ended) { progress(static_cast<std::size_t>(ended)); };
+  }
+  std::vector<filters::adaptation::Schedule> schedules;
+  torch::Tensor keypoints =
+      torch::empty({static_cast<std::int64_t>(requests.size()), smal::kNumKeypoints, 3}, torch::kFloat32);
+  float* out = keypoints.data_ptr<float>();
+  for (const device::AdaptRequest& request : requests) {
+    schedules.push_back(request.schedule);
+    const auto numbers = smal::numbers_of(request.keypoints);
+    out = std::copy(numbers.begin(), numbers.end(), out);
+  }
+  const model::TtaResult result = model::adapt(prima_, features_of(requests), keypoints, schedules, options);
+  std::vector<device::BodyPrediction> rows;
+  append_rows(result.best, rows);
   std::vector<device::AdaptOutcome> outcomes;
-  outcomes.reserve(requests.size());
-  for (std::size_t first = 0; first < requests.size(); first += adapt_batch_) {
-    const auto batch = requests.subspan(first, std::min(adapt_batch_, requests.size() - first));
-    std::vector<device::PatchView> patches;
-    std::vector<filters::adaptation::Schedule> schedules;
-    torch::Tensor keypoints =
-        torch::empty({static_cast<std::int64_t>(batch.size()), smal::kNumKeypoints, 3}, torch::kFloat32);
-    float* out = keypoints.data_ptr<float>();
-    for (const device::AdaptRequest& request : batch) {
-      patches.push_back(request.patch);
-      schedules.push_back(request.schedule);
-      const auto numbers = smal::numbers_of(request.keypoints);
-      out = std::copy(numbers.begin(), numbers.end(), out);
-    }
-    const model::ImageFeatures features = [&] {
-      const at::NoGradGuard no_gradients;
-      return prima_.encode(prima_.normalise(stack_patches(patches)));
-    }();
-    const model::TtaResult result = model::adapt(prima_, features, keypoints, schedules, options);
-    std::vector<device::BodyPrediction> rows;
-    append_rows(result.best, rows);
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      outcomes.push_back({rows[i], result.l_proj[i], result.held_out[i], result.best_iteration[i], {}});
-    }
-    for (const model::Prediction& snapshot : result.snapshots) {
-      std::vector<device::BodyPrediction> iterates;
-      append_rows(snapshot, iterates);
-      for (std::size_t i = 0; i < iterates.size(); ++i) {
-        outcomes[first + i].snapshots.push_back(iterates[i]);
-      }
-    }
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    outcomes.push_back({rows[i], result.l_proj[i], result.held_out[i], result.best_iteration[i], {}});
+  }
+  for (const model::Prediction& snapshot : result.snapshots) {
+    std::vector<device::BodyPrediction> iterates;
+    append_rows(snapshot, iterates);
+    for (std::size_t i = 0; i < iterates.size(); ++i) outcomes[i].snapshots.push_back(iterates[i]);
   }
   return outcomes;
 }

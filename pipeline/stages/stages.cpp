@@ -26,9 +26,9 @@ using nlohmann::json;
 
 // Raise a number when a change of the code changes what the stage writes.
 constexpr int kIngestCode = 3;
-constexpr int kPredictCode = 4;
+constexpr int kPredictCode = 5;
 constexpr int kFidelityCode = 2;
-constexpr int kRefineCode = 2;
+constexpr int kRefineCode = 3;
 constexpr int kMeasureCode = 2;
 constexpr int kCropsCode = 1;
 constexpr int kShardsCode = 2;

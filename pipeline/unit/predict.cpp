@@ -1,6 +1,10 @@
 #include "pipeline/unit/predict.h"
 
+#include <cmath>
+
+#include "filters/fidelity.h"
 #include "pipeline/unit/annotated_body.h"
+#include "pipeline/unit/prediction_error.h"
 
 namespace q3d::pipeline::unit {
 namespace {
@@ -38,9 +42,16 @@ void take_predicted_body(const device::BodyPrediction& body, PredictedSample& sa
   }
 }
 
+bool is_adapted(const UnitWork& work, std::size_t i, const PredictedSample& sample,
+                const config::JudgingRules& rules) {
+  const double error = error_of(sample, work.keypoints[i]);
+  return !std::isnan(error) && filters::is_adapted(error, rules.of(work.candidates[i].record.dataset));
+}
+
 }  // namespace
 
-void predict_unit(UnitWork& work, const NetworkSource& network, const Watch& watch) {
+void predict_unit(UnitWork& work, const NetworkSource& network, const Watch& watch,
+                  const config::JudgingRules* rules) {
   if (work.predicted) return;
   std::vector<PredictedSample> samples(work.candidates.size());
   std::vector<device::PatchView> patches;
@@ -56,12 +67,15 @@ void predict_unit(UnitWork& work, const NetworkSource& network, const Watch& wat
     if (samples[i].failure == Reason::none) take_annotated_body(work.candidates[i], samples[i]);
     if (watch.observer != nullptr) watch.observer->predicted(work, i, samples[i]);
   }
+  if (rules != nullptr) work.features.assign(samples.size(), nullptr);
   watch.for_each_batch(patches.size(), [&](std::size_t first, std::size_t count) {
+    std::vector<device::KeptFeatures> features;
     const std::vector<device::BodyPrediction> bodies =
-        network().predict(std::span(patches).subspan(first, count));
+        network().predict(std::span(patches).subspan(first, count), rules != nullptr ? &features : nullptr);
     for (std::size_t j = 0; j < bodies.size(); ++j) {
       const std::size_t i = positions[first + j];
       take_predicted_body(bodies[j], samples[i]);
+      if (rules != nullptr && is_adapted(work, i, samples[i], *rules)) work.features[i] = features.at(j);
       if (watch.observer != nullptr) watch.observer->predicted(work, i, samples[i]);
     }
     if (watch.observer != nullptr) {

@@ -1,6 +1,7 @@
 #include "pipeline/unit/refine.h"
 
 #include <cmath>
+#include <utility>
 
 #include "filters/keypoint_choice.h"
 #include "pipeline/unit/crop_keypoints.h"
@@ -26,7 +27,7 @@ device::AdaptRequest adapt_request(const std::string& id, const device::CropKeyp
 }
 
 void refine_unit(UnitWork& work, const NetworkSource& network, const config::JudgingRules& rules,
-                 const Watch& watch) {
+                 StepObserver* observer) {
   if (work.refined) return;
   std::vector<device::AdaptRequest> requests;
   std::vector<RefinedSample> samples;
@@ -37,19 +38,23 @@ void refine_unit(UnitWork& work, const NetworkSource& network, const config::Jud
     if (!filters::is_adapted(work.errors[i], thresholds)) continue;
     requests.push_back(adapt_request(candidate.record.id, work.keypoints[i], work.decoded[i].patch,
                                      work.errors[i], thresholds, rules.guards));
+    if (!work.features.empty()) requests.back().features = std::move(work.features[i]);
     samples.emplace_back().sample = i;
   }
-  watch.for_each_batch(requests.size(), [&](std::size_t first, std::size_t count) {
-    std::vector<device::AdaptOutcome> outcomes = network().adapt(std::span(requests).subspan(first, count));
+  work.features.clear();
+  if (!requests.empty()) {
+    const auto progress = [&](std::size_t ended) {
+      if (observer != nullptr) observer->batch_done(work, "refine", ended, requests.size());
+    };
+    std::vector<device::AdaptOutcome> outcomes = network().adapt(requests, {}, progress);
     for (std::size_t j = 0; j < outcomes.size(); ++j) {
-      RefinedSample& sample = samples[first + j];
-      sample.curve = std::move(outcomes[j].curve);
-      sample.held_out_curve = std::move(outcomes[j].held_out_curve);
-      sample.body = outcomes[j].best;
-      if (watch.observer != nullptr) watch.observer->refined(work, sample);
+      samples[j].curve = std::move(outcomes[j].curve);
+      samples[j].held_out_curve = std::move(outcomes[j].held_out_curve);
+      samples[j].body = outcomes[j].best;
+      if (observer != nullptr) observer->refined(work, samples[j]);
     }
-    if (watch.observer != nullptr) watch.observer->batch_done(work, "refine", first + count, requests.size());
-  });
+    progress(requests.size());
+  }
   work.refined = std::move(samples);
 }
 

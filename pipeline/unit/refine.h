@@ -19,10 +19,10 @@ device::AdaptRequest adapt_request(const std::string& id, const device::CropKeyp
                                    device::PatchView patch, double error,
                                    const filters::Thresholds& thresholds, const config::GuardConfig& guards);
 
-// Fills work.refined: adapts the candidates that the rule adapts, in batches inside the unit. The image
-// features are computed again from the crops, so that a resumed build gives the same bits as a build in one
-// go. Does nothing if work.refined is there.
+// Fills work.refined: adapts the candidates that the rule adapts, all of the unit in one call of the network.
+// Uses work.features where predict left them, which gives the same bits as encoding the crops again, and
+// frees them. Does nothing if work.refined is there.
 void refine_unit(UnitWork& work, const NetworkSource& network, const config::JudgingRules& rules,
-                 const Watch& watch = {});
+                 StepObserver* observer = nullptr);
 
 }  // namespace q3d::pipeline::unit
