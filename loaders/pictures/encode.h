@@ -7,6 +7,8 @@
 #include <span>
 #include <vector>
 
+#include "loaders/pictures/affine.h"
+
 namespace q3d::loaders::pictures {
 
 // Encodes 8-bit RGB as JPEG, 4:2:0, quality 1..100. Throws std::runtime_error if OpenCV cannot encode it.
@@ -18,5 +20,16 @@ std::vector<std::byte> encode_png(const cv::Mat& picture);
 // Decodes a picture that encode_* made to 8-bit RGB (`channels` 3) or one channel (1). Throws
 // std::runtime_error if the bytes are not a picture.
 cv::Mat decode_stored(std::span<const std::byte> bytes, int channels);
+
+// Pixels of a stored crop, and where the first of them lies in it.
+struct StoredRegion {
+  cv::Mat rgb;
+  cv::Point origin;
+};
+
+// Decodes the part of a stored RGB crop that warp_patch needs for this map from crop px to patch px, or more.
+// A JPEG is not decoded beyond it, which saves most of the time: a crop has 1.9 times the box's side. Throws
+// as decode_stored does.
+StoredRegion decode_stored_for(std::span<const std::byte> bytes, const Affine& patch_from_crop);
 
 }  // namespace q3d::loaders::pictures

@@ -7,6 +7,7 @@
 #include <cstdio>  // jpeglib.h needs FILE and size_t
 #include <memory>
 #include <new>
+#include <optional>
 
 #include <jpeglib.h>
 
@@ -33,6 +34,7 @@ struct Decoder {
   std::span<const std::byte> bytes;
   std::uint8_t* pixels = nullptr;
   std::size_t row_bytes = 0;
+  cv::Rect region;  // of the picture, for read_region
 };
 
 Decoder& owner(j_common_ptr info) {
@@ -75,6 +77,27 @@ void read_rows(Decoder& decoder) {
   jpeg_finish_decompress(&decoder.info);
 }
 
+// libjpeg widens the region to whole blocks on its left.
+void begin_region(Decoder& decoder) {
+  jpeg_start_decompress(&decoder.info);
+  auto left = static_cast<JDIMENSION>(decoder.region.x);
+  auto width = static_cast<JDIMENSION>(decoder.region.width);
+  jpeg_crop_scanline(&decoder.info, &left, &width);
+  decoder.region.x = static_cast<int>(left);
+  decoder.region.width = static_cast<int>(width);
+}
+
+void read_region(Decoder& decoder) {
+  const auto top = static_cast<JDIMENSION>(decoder.region.y);
+  if (top > 0) jpeg_skip_scanlines(&decoder.info, top);
+  const JDIMENSION end = top + static_cast<JDIMENSION>(decoder.region.height);
+  while (decoder.info.output_scanline < end) {
+    JSAMPROW row = decoder.pixels + (decoder.info.output_scanline - top) * decoder.row_bytes;
+    jpeg_read_scanlines(&decoder.info, &row, 1);
+  }
+  jpeg_abort_decompress(&decoder.info);
+}
+
 // Returns false if libjpeg gave up inside `step`.
 bool run(Decoder& decoder, void (*step)(Decoder&)) {
   if (setjmp(decoder.give_up) != 0) return false;
@@ -110,31 +133,61 @@ cv::Mat rgb_from_inverted_cmyk(const cv::Mat& cmyk) {
   return rgb;
 }
 
-DecodedImage decode_with(Decoder& decoder) {
+// Reads the header and chooses the colours -> the failure, if there is one.
+std::optional<DecodedImage> begin(Decoder& decoder) {
   if (!run(decoder, read_header)) return failed(decoder);
   const auto width = static_cast<std::int64_t>(decoder.info.image_width);
   const auto height = static_cast<std::int64_t>(decoder.info.image_height);
   if (width * height > kMaxPixels) {
-    return {{},
-            Reason::image_too_large,
-            fmt::format("got a JPEG of {} x {} px, expected at most {} px", width, height, kMaxPixels)};
+    return DecodedImage{
+        {},
+        Reason::image_too_large,
+        fmt::format("got a JPEG of {} x {} px, expected at most {} px", width, height, kMaxPixels)};
   }
+  decoder.info.out_color_space = decoder.info.num_components == 4 ? JCS_CMYK : JCS_RGB;
+  return std::nullopt;
+}
+
+cv::Mat room_for_pixels(Decoder& decoder, int width, int height) {
   const bool is_cmyk = decoder.info.num_components == 4;
-  decoder.info.out_color_space = is_cmyk ? JCS_CMYK : JCS_RGB;
-  cv::Mat pixels(static_cast<int>(height), static_cast<int>(width), is_cmyk ? CV_8UC4 : CV_8UC3);
+  cv::Mat pixels(height, width, is_cmyk ? CV_8UC4 : CV_8UC3);
   decoder.pixels = pixels.data;
   decoder.row_bytes = pixels.step;
+  return pixels;
+}
+
+DecodedImage finished(const Decoder& decoder, const cv::Mat& pixels) {
+  return {decoder.info.num_components == 4 ? rgb_from_inverted_cmyk(pixels) : pixels, Reason::none, {}};
+}
+
+DecodedImage decode_with(Decoder& decoder) {
+  if (auto failure = begin(decoder)) return *failure;
+  const cv::Mat pixels = room_for_pixels(decoder, static_cast<int>(decoder.info.image_width),
+                                         static_cast<int>(decoder.info.image_height));
   if (!run(decoder, read_rows) || decoder.ended_early) return failed(decoder);
-  return {is_cmyk ? rgb_from_inverted_cmyk(pixels) : pixels, Reason::none, {}};
+  return finished(decoder, pixels);
 }
 
-}  // namespace
-
-bool is_jpeg(std::span<const std::byte> bytes) {
-  return bytes.size() >= 2 && bytes[0] == std::byte{0xff} && bytes[1] == std::byte{0xd8};
+DecodedRegion decode_region_with(Decoder& decoder, const cv::Rect& wanted) {
+  if (auto failure = begin(decoder)) return {*failure, {}};
+  // Colours are stored in half the resolution: a pixel's depend on those of its neighbours, which libjpeg
+  // does not know beyond the edge of a region.
+  constexpr int kNeighboursPx = 4;
+  const cv::Rect all(0, 0, static_cast<int>(decoder.info.image_width),
+                     static_cast<int>(decoder.info.image_height));
+  const cv::Rect wider(wanted.x - kNeighboursPx, wanted.y - kNeighboursPx, wanted.width + 2 * kNeighboursPx,
+                       wanted.height + 2 * kNeighboursPx);
+  decoder.region = wider & all;
+  if (decoder.region.empty()) decoder.region = cv::Rect(0, 0, 1, 1);
+  if (!run(decoder, begin_region)) return {failed(decoder), {}};
+  const cv::Mat pixels = room_for_pixels(decoder, decoder.region.width, decoder.region.height);
+  if (!run(decoder, read_region) || decoder.ended_early) return {failed(decoder), {}};
+  return {finished(decoder, pixels), decoder.region.tl()};
 }
 
-DecodedImage decode_jpeg(std::span<const std::byte> bytes) {
+// Calls decode(decoder) between the making and the end of a decoder.
+template <typename Decode>
+auto with_decoder(std::span<const std::byte> bytes, Decode&& decode) {
   Decoder decoder;
   decoder.bytes = bytes;
   decoder.info.client_data = &decoder;
@@ -144,7 +197,21 @@ DecodedImage decode_jpeg(std::span<const std::byte> bytes) {
   decoder.progress.progress_monitor = on_progress;
   const std::unique_ptr<jpeg_decompress_struct, void (*)(jpeg_decompress_struct*)> guard(
       &decoder.info, jpeg_destroy_decompress);
-  return decode_with(decoder);
+  return decode(decoder);
+}
+
+}  // namespace
+
+bool is_jpeg(std::span<const std::byte> bytes) {
+  return bytes.size() >= 2 && bytes[0] == std::byte{0xff} && bytes[1] == std::byte{0xd8};
+}
+
+DecodedImage decode_jpeg(std::span<const std::byte> bytes) {
+  return with_decoder(bytes, decode_with);
+}
+
+DecodedRegion decode_jpeg_region(std::span<const std::byte> bytes, const cv::Rect& wanted) {
+  return with_decoder(bytes, [&](Decoder& decoder) { return decode_region_with(decoder, wanted); });
 }
 
 }  // namespace q3d::loaders::pictures

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <opencv2/core.hpp>
 #include <span>
 
 #include "loaders/pictures/image.h"
@@ -15,5 +16,16 @@ bool is_jpeg(std::span<const std::byte> bytes);
 // oddities that libjpeg warns about (stray bytes between markers) are accepted, as PIL does. Throws
 // std::bad_alloc, or cv::Exception with StsNoMem, if memory runs out.
 DecodedImage decode_jpeg(std::span<const std::byte> bytes);
+
+// A part of a picture, and where its first pixel lies in the picture.
+struct DecodedRegion {
+  DecodedImage image;
+  cv::Point origin;
+};
+
+// Decodes a part that covers `wanted`, as far as this lies in the picture: at least one pixel. Within it, the
+// pixels are those of decode_jpeg. Only the compressed data up to its last row are read, so that a picture
+// that ends later than that is not noticed. Throws as decode_jpeg does.
+DecodedRegion decode_jpeg_region(std::span<const std::byte> bytes, const cv::Rect& wanted);
 
 }  // namespace q3d::loaders::pictures

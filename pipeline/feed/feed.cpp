@@ -169,16 +169,20 @@ void Feed::fill(FeedBatch& batch, std::int64_t slot) const {
   }
   const loaders::pictures::Affine patch_from_image =
       loaders::pictures::augmented_patch_from_image(sample.box, augmentation);
-  cv::Mat crop;
+  const loaders::pictures::Affine patch_from_crop =
+      loaders::pictures::patch_from_stored_crop(patch_from_image, sample.crop_from_image);
+  loaders::pictures::StoredRegion region;
   try {
-    crop = loaders::pictures::decode_stored(sample.crop, 3);
+    region = loaders::pictures::decode_stored_for(sample.crop, patch_from_crop);
   } catch (const std::runtime_error& error) {
     throw std::runtime_error(
         fmt::format("pool {}: sample {}: its stored crop cannot be decoded: {}; `verify` checks the shards",
                     pool.name(), pool.id(draw.sample), error.what()));
   }
+  const loaders::pictures::Affine crop_from_region{1.0, 0.0, static_cast<double>(region.origin.x),
+                                                   0.0, 1.0, static_cast<double>(region.origin.y)};
   const loaders::pictures::Patch patch = loaders::pictures::warp_patch(
-      crop, cv::Mat(), loaders::pictures::patch_from_stored_crop(patch_from_image, sample.crop_from_image));
+      region.rgb, cv::Mat(), loaders::pictures::compose(patch_from_crop, crop_from_region));
   loaders::pictures::normalise_patch(
       patch.rgb, augmentation.colour,
       {batch.images.get() + static_cast<std::size_t>(slot) * kImageNumbers, kImageNumbers});

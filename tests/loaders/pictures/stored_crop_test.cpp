@@ -6,6 +6,7 @@
 
 #include "loaders/pictures/augment.h"
 #include "loaders/pictures/encode.h"
+#include "loaders/pictures/jpeg.h"
 
 namespace q3d::loaders::pictures {
 namespace {
@@ -26,6 +27,56 @@ TEST(Affine, compose_and_invert) {
   EXPECT_DOUBLE_EQ(back.x, 3.0);
   EXPECT_DOUBLE_EQ(back.y, -7.0);
   EXPECT_THROW(invert({1.0, 2.0, 0.0, 2.0, 4.0, 0.0}), std::invalid_argument);
+}
+
+cv::Mat smooth(int side, std::uint64_t seed) {
+  cv::Mat picture = noise({side, side}, CV_8UC3, seed);
+  cv::GaussianBlur(picture, picture, {9, 9}, 3.0);
+  return picture;
+}
+
+// Colours of neighbours and block edges are where a part could differ from the whole.
+TEST(StoredCrop, a_region_of_a_jpeg_has_the_pixels_of_the_whole) {
+  const std::vector<std::byte> jpeg = encode_jpeg(smooth(301, 5), 90);
+  const cv::Mat whole = decode_jpeg(jpeg).rgb;
+  std::mt19937_64 engine(3);
+  const auto draw = [&engine](int below) {
+    return static_cast<int>(engine() % static_cast<unsigned>(below));
+  };
+  for (int i = 0; i < 300; ++i) {
+    const cv::Rect wanted(draw(340) - 30, draw(340) - 30, 1 + draw(200), 1 + draw(200));
+    const cv::Rect inside = wanted & cv::Rect(0, 0, 301, 301);
+    if (inside.empty()) continue;
+    const DecodedRegion region = decode_jpeg_region(jpeg, wanted);
+    const cv::Rect place(region.origin, region.image.rgb.size());
+    ASSERT_EQ(place & inside, inside) << wanted;
+    ASSERT_EQ(cv::norm(region.image.rgb(inside - region.origin), whole(inside), cv::NORM_INF), 0.0) << wanted;
+  }
+}
+
+// Cutting a patch from the region that it needs gives the patch that the whole crop gives.
+TEST(StoredCrop, a_patch_of_its_region_is_that_of_the_whole) {
+  const std::vector<std::byte> jpeg = encode_jpeg(smooth(480, 6), 95);
+  const std::vector<std::byte> png = encode_png(smooth(480, 6));
+  std::mt19937_64 engine(4);
+  std::size_t pixels = 0;
+  for (int i = 0; i < 60; ++i) {
+    const SquareBox box{240.0 + i % 7, 235.0, 253.0};
+    const Affine patch_from_crop = augmented_patch_from_image(box, draw_augmentation({}, engine));
+    for (const std::vector<std::byte>& bytes : {jpeg, png}) {
+      const cv::Mat whole = is_jpeg(bytes) ? decode_jpeg(bytes).rgb : decode_stored(bytes, 3);
+      const StoredRegion region = decode_stored_for(bytes, patch_from_crop);
+      const Affine shift{1.0, 0.0, 1.0 * region.origin.x, 0.0, 1.0, 1.0 * region.origin.y};
+      const cv::Mat part = warp_patch(region.rgb, {}, compose(patch_from_crop, shift)).rgb;
+      const cv::Mat expected = warp_patch(whole, {}, patch_from_crop).rgb;
+      // A position that lies between two multiples of 1/32 px may be rounded the other way.
+      cv::Mat differs;
+      cv::absdiff(part, expected, differs);
+      ASSERT_LE(cv::countNonZero(differs.reshape(1)), 6) << i;
+      if (is_jpeg(bytes)) pixels += region.rgb.total();
+    }
+  }
+  EXPECT_LT(pixels, 60U * 480U * 480U * 3U / 4U) << "the region is not much smaller than the crop";
 }
 
 TEST(StoredCrop, every_augmented_patch_lies_inside) {
