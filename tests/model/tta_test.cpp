@@ -134,6 +134,35 @@ TEST_F(Tta, InstancesDoNotFeelTheirBatchMates) {
   }
 }
 
+// With two slots, the third and the fourth instance start when others have ended. Each is as if it had run
+// alone, in its own place in the results, and one without keypoints leaves its slot at once.
+TEST_F(Tta, FreedSlotsGoToTheNextInstances) {
+  const std::vector<Schedule> schedules{steps(3), steps(9), steps(5), steps(7)};
+  torch::Tensor keypoints = samples_->keypoints.clone();
+  keypoints[2].select(1, 2).fill_(0.0);
+  TtaOptions options = fast();
+  options.snapshots = {0, 4};
+  const TtaResult all_at_once = adapt(samples_->prima, samples_->features, keypoints, schedules, options);
+  std::vector<std::int64_t> told;
+  options.slots = 2;
+  options.progress = [&](std::int64_t finished) { told.push_back(finished); };
+  const TtaResult queued = adapt(samples_->prima, samples_->features, keypoints, schedules, options);
+  // The first ends after 3 steps, the third at its first iterate, and the fourth, with 7 steps left, after
+  // the second.
+  EXPECT_EQ(told, (std::vector<std::int64_t>{1, 2, 3, 4}));
+  EXPECT_TRUE(queued.l_proj[2].empty());
+  for (std::size_t i = 0; i < 4; ++i) {
+    const auto row = static_cast<std::int64_t>(i);
+    ASSERT_EQ(queued.l_proj[i].size(), all_at_once.l_proj[i].size());
+    EXPECT_EQ(queued.best_iteration[i], all_at_once.best_iteration[i]);
+    expect_near(queued.last.rotations[row], all_at_once.last.rotations[row], kBatchNoise);
+    expect_near(queued.best.keypoints_2d[row], all_at_once.best.keypoints_2d[row], kBatchNoise);
+    for (std::size_t s = 0; s < 2; ++s) {
+      expect_near(queued.snapshots[s].rotations[row], all_at_once.snapshots[s].rotations[row], kBatchNoise);
+    }
+  }
+}
+
 TEST_F(Tta, StopsBelowTheThreshold) {
   const TtaResult free = run(samples_->keypoints, all(steps(12)));
   std::vector<Schedule> schedules = all(steps(12));
