@@ -47,9 +47,10 @@ assets: setup  ## fetch, verify and import the official weights and body (ACCEPT
 $(BUILD)/build.ninja: | setup
 	cmake --preset $(PRESET) $(CMAKE_ARGS)
 
-bench: setup  ## build the benchmarks (bench/README.md says how to run them)
+bench: setup  ## build the benchmarks and run those of the network and the feed beside their baselines (bench/README.md)
 	cmake --preset $(PRESET) -DQ3D_BENCH=ON
-	cmake --build $(BUILD) --parallel $(JOBS)
+	cmake --build $(BUILD) --parallel $(JOBS) --target model_bench feed_bench leakage_bench
+	.venv/bin/python bench/run.py $(BUILD)
 
 asan:  ## all tests under the address and undefined-behaviour sanitizers
 	$(MAKE) test PRESET=asan
