@@ -116,7 +116,7 @@ bool is_unchanged(const run::RunOptions& options, const UpToDateRecord& record, 
 void finish(const run::RunOptions& options, BuildSummary& summary, Clock::time_point start) {
   summary.dataset = dataset::read_dataset_manifest(summary.folder);
   for (const dataset::Warning& warning : summary.dataset.warnings) run::log_warning(warning.message);
-  require_labels(summary.dataset, summary.folder);
+  require_labels(summary.dataset, summary.folder, config.max_failed_share);
   if (!options.rebuild) point_latest(options.out, summary.folder);
   summary.seconds = seconds_since(start);
 }

@@ -90,9 +90,12 @@ config::JudgingRules checked_rules(const config::BuildConfig& config, bool above
   return rules;
 }
 
-void require_labels(const dataset::DatasetManifest& manifest, const std::filesystem::path& folder) {
+void require_labels(const dataset::DatasetManifest& manifest, const std::filesystem::path& folder,
+                    double max_failed_share) {
   const dataset::Counts& counts = manifest.counts;
-  if (counts.retained + counts.refined > 0) return;
+  const bool has_labels = counts.retained + counts.refined > 0;
+  const auto most_failed = max_failed_share * static_cast<double>(counts.candidates);
+  if (has_labels && static_cast<double>(counts.failed) <= most_failed) return;
   std::string reasons;
   for (const auto& [reason, count] : manifest.reasons) {
     reasons += fmt::format("{}{} {}", reasons.empty() ? "" : ", ", manifests::to_string(reason), count);
@@ -104,11 +107,16 @@ void require_labels(const dataset::DatasetManifest& manifest, const std::filesys
                          : fmt::format("of {} candidates {} were discarded and {} failed", counts.candidates,
                                        counts.discarded, counts.failed);
   }
+  const std::string what =
+      has_labels ? fmt::format(
+                       "{} of {} candidates failed, which is more than the share of max_failed_share "
+                       "= {:g}: most often pictures are not where the config looks for them",
+                       counts.failed, counts.candidates, max_failed_share)
+                 : "no label was kept: " + outcome;
   throw std::runtime_error(fmt::format(
-      "no label was kept: {}{}. `latest` stays as it was; {} lists every candidate with its reason, "
-      "`quadruped3d explain` tells one's whole story, and docs/troubleshooting.md says what to do about each "
-      "reason",
-      outcome, reasons.empty() ? "" : " (" + reasons + ")", (folder / "verdicts.csv").string()));
+      "{}{}. `latest` stays as it was; {} lists every candidate with its reason, `quadruped3d explain` tells "
+      "one's whole story, and docs/troubleshooting.md says what to do about each reason",
+      what, reasons.empty() ? "" : " (" + reasons + ")", (folder / "verdicts.csv").string()));
 }
 
 }  // namespace q3d::pipeline::build

@@ -41,7 +41,9 @@ void require_below_ceiling(const std::string& dataset, double tau_high, double t
 // require_below_ceiling unless `above_ceiling`.
 config::JudgingRules checked_rules(const config::BuildConfig& config, bool above_ceiling);
 
-// Throws std::runtime_error that says why, if the dataset in `folder` has no label.
-void require_labels(const dataset::DatasetManifest& manifest, const std::filesystem::path& folder);
+// Throws std::runtime_error that says why, if the dataset in `folder` has no label, or if more than
+// `max_failed_share` of its candidates failed.
+void require_labels(const dataset::DatasetManifest& manifest, const std::filesystem::path& folder,
+                    double max_failed_share);
 
 }  // namespace q3d::pipeline::build

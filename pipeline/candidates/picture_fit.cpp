@@ -73,6 +73,7 @@ class PictureFit {
 
   void fit(SampleRecord& record, const PictureHeader& header) {
     const Size stored{header.width_px, header.height_px};
+    if (is_too_large(record, stored)) return;
     const bool exchanges = loaders::pictures::exchanges_sides(header.orientation);
     const Size turned = exchanges ? stored.exchanged() : stored;
     if (options_.turns_by_exif) record.orientation = header.orientation;
@@ -91,6 +92,18 @@ class PictureFit {
   std::vector<loaders::formats::Note> notes() const { return notes_.list(); }
 
  private:
+  // Refuses a picture by its header, before anything takes memory for its pixels.
+  bool is_too_large(SampleRecord& record, const Size& stored) const {
+    constexpr double kMega = 1e6;
+    const double megapixels = static_cast<double>(stored.width_px) * stored.height_px / kMega;
+    if (megapixels <= options_.max_picture_megapixels) return false;
+    record.failure = Reason::image_too_large;
+    record.failure_detail =
+        fmt::format("got a picture of {} px, expected at most {:g} megapixels (max_picture_megapixels)",
+                    stored.text(), options_.max_picture_megapixels);
+    return true;
+  }
+
   // Compares the stated size with the picture's. Returns false if the record failed.
   bool fit_size(SampleRecord& record, const PictureHeader& header, const Size& size) {
     const Size stated{record.width_px, record.height_px};

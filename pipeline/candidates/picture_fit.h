@@ -8,6 +8,7 @@ namespace q3d::pipeline::candidates {
 
 // Reads the header of every picture, in parallel, and compares its size with the stated one. No picture is
 // decoded.
+// - A record whose picture has more than `max_picture_megapixels` fails as `image_too_large`.
 // - With `orientation: exif`, the record gets the picture's EXIF orientation, by which the picture is turned
 // when
 //   it is decoded. Box and keypoints stay: they were made on the turned picture.

@@ -24,11 +24,15 @@ void require(bool holds, const std::string& where, const std::string& what) {
   if (!holds) throw run::ConfigError(where + ": " + what);
 }
 
+// File systems take names of 255 bytes, and keys and endings are added to these.
+constexpr std::size_t kMaxNameBytes = 200;
+
 // Returns whether the text may become a file's name.
 bool is_plain_name(std::string_view text) {
-  return !text.empty() && std::all_of(text.begin(), text.end(), [](unsigned char c) {
-    return std::isalnum(c) != 0 || c == '_' || c == '.' || c == '-';
-  });
+  return !text.empty() && text.size() <= kMaxNameBytes &&
+         std::all_of(text.begin(), text.end(), [](unsigned char c) {
+           return std::isalnum(c) != 0 || c == '_' || c == '.' || c == '-';
+         });
 }
 
 bool is_version(std::string_view text) {
@@ -70,7 +74,7 @@ DatasetConfig parse_dataset(const json& object, const std::string& where) {
   read_own_labels(fields, dataset);
   fields.finish();
   require(is_plain_name(dataset.name), where,
-          "\"name\" may hold letters, digits, '.', '_' and '-' only, got \"" + dataset.name + "\"");
+          "\"name\" may hold up to 200 letters, digits, '.', '_' and '-' only, got \"" + dataset.name + "\"");
   require(dataset.role != Role::truth || dataset.format == "prima", where,
           "\"role\": \"truth\" needs a format that gives bodies, which is \"prima\"; got \"" +
               dataset.format + "\". For keypoints alone use \"2d_only\"");
@@ -236,7 +240,7 @@ void parse_parts(JsonFields& fields, const std::string& where, BuildConfig& conf
 
 void check_names(const BuildConfig& config, const std::string& where) {
   require(is_plain_name(config.name), where,
-          "\"name\" becomes a folder's name: letters, digits, '.', '_' and '-' only");
+          "\"name\" becomes a folder's name: up to 200 letters, digits, '.', '_' and '-' only");
   require(is_version(config.version), where,
           "\"version\" must look like 1.0.0, got \"" + config.version + "\"");
   std::set<std::string> seen;

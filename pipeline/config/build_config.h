@@ -32,8 +32,9 @@ struct DatasetConfig : loaders::formats::DatasetOptions {
   std::string licence{};
   std::string source_url{};
   std::string citation{};
-  bool turns_by_exif = false;   // the labels were made on the pictures as EXIF turns them
-  bool scales_resized = false;  // labels of pictures that were resized since are scaled with them
+  bool turns_by_exif = false;             // the labels were made on the pictures as EXIF turns them
+  double max_picture_megapixels = 200.0;  // a larger picture fails before it is decoded
+  bool scales_resized = false;            // labels of pictures that were resized since are scaled with them
 };
 
 struct NetworkConfig {
@@ -118,7 +119,8 @@ struct BuildConfig {
   ShardConfig shards;
   CalibrateConfig calibrate;
   std::optional<LeakageConfig> leakage;
-  std::filesystem::path veto;  // ids to leave out (pipeline/candidates/veto.h); empty when there are none
+  double max_failed_share = 0.9;  // of the candidates; a build in which more failed exits 1
+  std::filesystem::path veto;     // ids to leave out (pipeline/candidates/veto.h); empty when there are none
   std::filesystem::path
       corrections;            // keypoints (pipeline/candidates/corrections.h); empty when there are none
   nlohmann::json as_written;  // the merged JSON, paths as the user wrote them

@@ -59,6 +59,12 @@ const Settings<BuildConfig>& build_settings() {
            "(`tta.pose_prior_weight` 0.003), and discards labels that are trusted little (`filter.min_trust` "
            "0.8). This made labels more accurate on rendered worlds (docs/results.md)",
        .words = profile_names()},
+      {.key = "max_failed_share",
+       .member = &BuildConfig::max_failed_share,
+       .description =
+           "share of the candidates that may fail. If more failed, as when a disk of pictures is not "
+           "mounted, `build` exits with 1 and leaves `latest` where it was. 1 accepts any share",
+       .range = {.least = 0, .most = 1}},
       {.key = "veto",
        .member = &BuildConfig::veto,
        .description = "a list of samples to leave out, see below. `build --veto FILE` replaces it"},
@@ -117,6 +123,12 @@ const Settings<DatasetConfig>& dataset_settings() {
            "what happens to labels whose file states another size than the picture has: `refuse` fails them "
            "as `size_mismatch`; `scale` scales box and keypoints if width and height differ by one factor",
        .words = {"refuse", "scale"}},
+      {.key = "max_picture_megapixels",
+       .member = &DatasetConfig::max_picture_megapixels,
+       .description =
+           "candidates whose picture has more millions of pixels fail as `image_too_large`. The picture's "
+           "header is read for it, so that no memory is taken for a picture that only claims to be large",
+       .range = {.least = 0, .most = 200, .is_open_below = true}},
       {.key = "curation",
        .member = &DatasetConfig::curation,
        .description =

@@ -72,19 +72,33 @@ TEST(Ceiling, IsItselfAllowed) {
 TEST(Labels, ADatasetWithoutAnyIsRefusedWithItsReasons) {
   dataset::DatasetManifest manifest;
   manifest.counts = {.candidates = 9, .retained = 0, .refined = 1, .discarded = 5, .failed = 3};
-  EXPECT_NO_THROW(require_labels(manifest, "out/v"));
+  EXPECT_NO_THROW(require_labels(manifest, "out/v", 0.9));
   manifest.counts.refined = 0;
   manifest.reasons = {{manifests::Reason::error_too_large, 5}, {manifests::Reason::image_missing, 3}};
-  EXPECT_THAT([&] { require_labels(manifest, "out/v"); },
+  EXPECT_THAT([&] { require_labels(manifest, "out/v", 0.9); },
               ThrowsMessage<std::runtime_error>(
                   AllOf(HasSubstr("no label was kept: of 9 candidates 5 were discarded and 3 failed"),
                         HasSubstr("error_too_large 5"), HasSubstr("out/v/verdicts.csv"))));
   manifest.counts = {.candidates = 3, .retained = 0, .refined = 0, .discarded = 0, .failed = 3};
-  EXPECT_THAT([&] { require_labels(manifest, "out/v"); },
+  EXPECT_THAT([&] { require_labels(manifest, "out/v", 0.9); },
               ThrowsMessage<std::runtime_error>(HasSubstr("all 3 candidates failed")));
   manifest.counts = {};
-  EXPECT_THAT([&] { require_labels(manifest, "out/v"); },
+  EXPECT_THAT([&] { require_labels(manifest, "out/v", 0.9); },
               ThrowsMessage<std::runtime_error>(HasSubstr("there are no candidates")));
+}
+
+// Pictures on a disk that is not mounted: what is left must not take the place of a good dataset.
+TEST(Labels, ADatasetOfWhichTooManyFailedIsRefused) {
+  dataset::DatasetManifest manifest;
+  manifest.counts = {.candidates = 10, .retained = 1, .refined = 0, .discarded = 0, .failed = 9};
+  manifest.reasons = {{manifests::Reason::image_missing, 9}};
+  EXPECT_NO_THROW(require_labels(manifest, "out/v", 0.9));
+  EXPECT_NO_THROW(require_labels(manifest, "out/v", 1.0));
+  EXPECT_THAT(
+      [&] { require_labels(manifest, "out/v", 0.85); },
+      ThrowsMessage<std::runtime_error>(AllOf(
+          HasSubstr("9 of 10 candidates failed, which is more than the share of max_failed_share = 0.85"),
+          HasSubstr("image_missing 9"), HasSubstr("`latest` stays"))));
 }
 
 }  // namespace

@@ -147,6 +147,14 @@ TEST(BuildConfig, RefusesWhatLabelsOfOnesOwnCannotHave) {
 }
 
 // One good config, broken one key at a time.
+TEST(BuildConfig, ANameMustFitIntoAFolder) {
+  json config = good();
+  config["name"] = std::string(200, 'n');
+  EXPECT_EQ(parse_build_config(config, "t").name.size(), 200U);
+  config["name"] = std::string(201, 'n');
+  EXPECT_THROW(parse_build_config(config, "t"), run::ConfigError);
+}
+
 struct Mutation {
   const char* pointer;
   const char* value;
@@ -194,6 +202,9 @@ INSTANTIATE_TEST_SUITE_P(
         Mutation{"/datasets/0/keypoints_3d", "\"bdy\"", "file, body"},
         Mutation{"/datasets/0/rot", "\"x\"", "did you mean \"root\"?"},
         Mutation{"/datasets/0/name", "\"../x\"", "letters, digits"},
+        Mutation{"/datasets/0/max_picture_megapixels", "0", "max_picture_megapixels"},
+        Mutation{"/datasets/0/max_picture_megapixels", "201", "max_picture_megapixels"},
+        Mutation{"/max_failed_share", "1.1", "max_failed_share"},
         Mutation{"/datasets/0/role", "\"truht\"", "Did you mean \"truth\"?"},
         Mutation{"/network/dtype", "\"float16\"", "float32, bfloat16"},
         Mutation{"/network/batch", "0", "at least 1"},
