@@ -12,6 +12,7 @@ FUZZ_SECONDS ?= 60
 FUZZ_TARGETS ?=
 KILLS ?= 1000
 FLIPS ?= 300
+FAULTS ?= 25 --jobs labels
 
 .PHONY: quadruped3d sample-model sample-loop test program build setup test-wheels assets format tidy nightly bench asan fuzz torture clean help
 
@@ -61,16 +62,17 @@ fuzz: setup  ## fuzz every reader of files for FUZZ_SECONDS each (clang; tests/f
 	cmake --build build/fuzz --parallel $(JOBS) --target fuzz_targets
 	tools/fuzz.sh build/fuzz $(FUZZ_SECONDS) $(FUZZ_TARGETS)
 
-torture: build  ## KILLS kills of all commands and FLIPS damaged files; compares what is left (tests/torture)
+torture: build  ## KILLS kills of all commands, FLIPS damaged files, failing calls; compares what is left (tests/torture)
 	.venv/bin/python tests/torture/torture.py $(KILLS)
 	.venv/bin/python tests/torture/rot.py $(FLIPS)
+	.venv/bin/python tests/torture/faults.py $(FAULTS)
 
 nightly:  ## all that CI has no time for: clang-tidy on every source, tests under the sanitizers, fuzzing, torture
 	$(MAKE) build
 	BUILD=$(BUILD) JOBS=$(JOBS) tools/tidy.sh --all
 	$(MAKE) asan
 	$(MAKE) fuzz FUZZ_SECONDS=600
-	$(MAKE) torture
+	$(MAKE) torture FAULTS=1
 
 format:  ## format every source in place
 	git ls-files '*.h' '*.cpp' | xargs clang-format -i

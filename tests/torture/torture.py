@@ -218,23 +218,34 @@ def torture(jobs, folder, kills, draw):
     return done, failed, number
 
 
+def add_program_options(parser):
+    parser.add_argument("--program", type=pathlib.Path, default=ROOT / "build/release/bin/quadruped3d")
+    parser.add_argument("--faults", type=pathlib.Path, default=ROOT / "build/release/tests/faults/libq3d_faults.so")
+
+
+def use_program(arguments):
+    """Tells the tests' own package where the program is. False, after a message, if it is not there."""
+    for variable, path in (("Q3D_PROGRAM", arguments.program), ("Q3D_FAULTS", arguments.faults)):
+        if not path.exists():
+            print(f"{sys.argv[0]}: {path}: no such file; build it, or say where it is", file=sys.stderr)
+            return False
+        os.environ[variable] = str(path.resolve())
+    return True
+
+
 def parsed():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("kills", type=int)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--jobs", default=",".join(JOBS), help="names, separated by commas (default: %(default)s)")
-    parser.add_argument("--program", type=pathlib.Path, default=ROOT / "build/release/bin/quadruped3d")
-    parser.add_argument("--faults", type=pathlib.Path, default=ROOT / "build/release/tests/faults/libq3d_faults.so")
+    add_program_options(parser)
     return parser.parse_args()
 
 
 def main():
     arguments = parsed()
-    for variable, path in (("Q3D_PROGRAM", arguments.program), ("Q3D_FAULTS", arguments.faults)):
-        if not path.exists():
-            print(f"torture: {path}: no such file; build it, or say where it is", file=sys.stderr)
-            return 2
-        os.environ[variable] = str(path.resolve())
+    if not use_program(arguments):
+        return 2
     folder = pathlib.Path(tempfile.mkdtemp(prefix="q3d_torture_")).resolve()
     (folder / "shared").mkdir()
     inputs = Inputs(folder / "shared")

@@ -198,3 +198,20 @@ class NoFiles(Drawn):
         details = " ".join(row["detail"] for row in verdicts(datasets[0]))
         for words in ("p000.png: got a GIF picture", "p001.png: "):
             self.assertIn(words, details)
+
+    def test_no_absolute_path_in_what_is_passed_on(self):
+        """In no file of a version, a report, an export or a part of a dataset, whatever the config's paths are."""
+        out = self.folder / "out"
+        self.build("--quiet")
+        run("report", out, "--gallery", 2)
+        run("subset", out, "--where", "verdict = retained", "--out", self.folder / "part")
+        for kind in ("coco", "prima"):
+            run("export", out, "--format", kind, "--out", self.folder / kind, "--pictures-anyway")
+        folders = [latest(out), out / "report", latest(self.folder / "part"), self.folder / "coco", self.folder / "prima"]
+        files = [path for folder in folders for path in folder.rglob("*") if path.is_file()]
+        self.assertGreater(len(files), 15)
+        own = {str(self.folder), str(self.shared), os.path.expanduser("~") + "/"}
+        for path in files:
+            content = path.read_bytes()
+            for place in own:
+                self.assertNotIn(place.encode(), content, path)

@@ -135,7 +135,7 @@ class Progress(Case):
         """The program stops before a first unit is written, and has told of a first batch of four animals."""
         for more in ([], ["--adapt", 3]):
             words = command(["predict", "--config", self.scene.config, "--out", self.folder / f"out{len(more)}", *more])
-            running = OnTerminal(words, self.env(Fault(".h5.", "sync", "stop")))
+            running = OnTerminal(words, self.env(Fault(".h5.", "sync", "stop"), NO_COLOR="1"))
             try:
                 self.assertTrue(running.wait_for_stop(), running.stderr())
                 self.assertRegex(running.stderr(), rf"animals \[[^\n]* 4/{PICTURES} ", more)
