@@ -67,7 +67,7 @@ struct Ingest {
   std::vector<Candidate> candidates;  // dataset order of the config, then file order
   std::vector<Unit> units;
   std::map<std::string, std::string> annotation_digests;  // "name/split" -> SHA-256 of its annotation files
-  std::vector<std::filesystem::path> files;  // that were read, beside pictures and masks
+  std::vector<std::filesystem::path> files;               // that were read, beside pictures and masks
   std::set<std::string> rendered;  // "name/split" of those whose pictures `sample` rendered
   std::vector<IngestNote> notes;
   std::optional<Corrections> corrections;  // their points are in the records
