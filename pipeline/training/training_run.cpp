@@ -134,6 +134,15 @@ std::shared_ptr<model::PrimaNet> initial_net(const TrainingNetworkConfig& networ
   return net;
 }
 
+// The origin and licence of a pre-trained stem, as the initial checkpoint's metadata tell it.
+std::map<std::string, std::string> stem_origin(const TrainingNetworkConfig& network) {
+  std::map<std::string, std::string> origin;
+  for (const auto& [key, value] : smal::tensors::SafeTensors::open(network.initial).metadata()) {
+    if (key.starts_with("stem_")) origin[key] = value;
+  }
+  return origin;
+}
+
 // A digest over all that decides the weights, but for device and threads: effective settings, assets and
 // samples. All files are read, because a run of days is worth it.
 std::string run_key(const TrainingConfig& config, const nlohmann::json& samples) {
@@ -447,7 +456,9 @@ class Run {
     if (config_.model_dtype == ModelDtype::float16) {
       for (auto& [name, tensor] : tensors) tensor = tensor.to(torch::kFloat16);
     }
-    model::write_checkpoint(path, net->config(), tensors, domain_of(net));
+    std::map<std::string, std::string> metadata = domain_of(net);
+    metadata.merge(stem_origin(config_.network));
+    model::write_checkpoint(path, net->config(), tensors, metadata);
     return path;
   }
 

@@ -157,6 +157,7 @@ TEST_F(TrainingRun, AStemLearnsBehindItsFrozenBlocksAndResumes) {
   EXPECT_EQ(manifests::read_file(straight.model), manifests::read_file(run("stopped").model));
   const smal::tensors::SafeTensors before = smal::tensors::SafeTensors::open(path("initial"));
   const smal::tensors::SafeTensors after = smal::tensors::SafeTensors::open(straight.model);
+  EXPECT_EQ(after.metadata().at("stem_licence"), before.metadata().at("stem_licence"));
   const std::string prefix = "backbone.patch_embed.efficientnet.";
   for (const std::string& name : before.names()) {
     if (!name.starts_with(prefix)) continue;
