@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "loaders/formats/bounded_text.h"
 #include "loaders/formats/formats.h"
 #include "loaders/keypoints/builtin_topologies.h"
 #include "loaders/pictures/box.h"
@@ -85,8 +86,9 @@ void set_found_picture(Loading& loading, RecordReader& reader, const PictureName
                        const std::string& annotation, SampleRecord& sample) {
   sample.dataset = loading.options.name;
   sample.split = loading.options.split;
-  sample.image_ref = name.name;
-  sample.id = fmt::format("{}/{}/{}#{}", sample.dataset, sample.split, id_part(name.name), annotation);
+  sample.image_ref = bounded_text(name.name);
+  sample.id = fmt::format("{}/{}/{}#{}", sample.dataset, sample.split, id_part(sample.image_ref),
+                          bounded_text(annotation));
   if (reader.failed()) return;
   if (found.failure == Reason::none) {
     sample.image_path = found.path.string();
@@ -151,6 +153,7 @@ void check_visible(RecordReader& reader, const std::string& field, const SampleR
 
 void set_family(Loading& loading, std::optional<Family> stated, std::optional<Family> from_table,
                 SampleRecord& sample) {
+  sample.species = bounded_text(std::move(sample.species));
   sample.family = stated ? *stated : from_table.value_or(Family::none);
   if (stated && from_table && *stated != *from_table) {
     loading.notes.count(
@@ -167,6 +170,11 @@ void set_family(Loading& loading, std::optional<Family> stated, std::optional<Fa
 }
 
 Dataset finished(Loading& loading, std::vector<SampleRecord> records) {
+  for (SampleRecord& record : records) {
+    for (std::string* text : {&record.species, &record.source, &record.failure_detail}) {
+      *text = bounded_text(std::move(*text));
+    }
+  }
   const auto note = [&](const char* text, std::size_t count, NoteKind kind = NoteKind::remark) {
     if (count > 0) loading.notes.add(fmt::format("{}: {}", text, count), kind);
   };

@@ -227,6 +227,27 @@ TEST(Load, ids_and_messages_stay_on_one_line_and_in_utf8) {
   EXPECT_NO_THROW(json(dataset.records[1].failure_detail).dump());
 }
 
+// A column of a table is as wide as its longest text, so an endless name must not reach one.
+TEST(Load, endless_texts_are_shortened_and_stay_apart) {
+  const Folder folder;
+  const std::string endless(std::size_t{5} << 20U, 'n');
+  std::vector<json> records{prima_record("images/" + endless + "1.png"), prima_record(endless + "2.png")};
+  std::set<std::string> ids;
+  for (const SampleRecord& record : folder.load_prima(records).records) {
+    EXPECT_EQ(record.failure, Reason::record_malformed) << record.failure_detail;
+    ids.insert(record.id.substr(0, record.id.rfind('#')));
+    for (const std::string& text : {record.id, record.image_ref, record.failure_detail, record.species}) {
+      EXPECT_LT(text.size(), 600U);
+    }
+  }
+  EXPECT_EQ(ids.size(), 2U);
+  json kingdom = kingdom_record();
+  kingdom["animal"] = endless;
+  const Dataset dataset = folder.load("animal_kingdom", json::array({kingdom}));
+  EXPECT_LT(dataset.records[0].species.size(), 600U);
+  for (const Note& note : dataset.notes) EXPECT_LT(note.text.size(), 2000U);
+}
+
 // The reason that each broken value of a field must lead to. "@" in the JSON stands for a literal that JSON
 // does not know.
 struct Break {
