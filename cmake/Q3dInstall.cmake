@@ -5,7 +5,7 @@
 # PREFIX/lib/quadruped3d/torch           LibTorch: a link to its folder, or a copy (see docs/install.md)
 # PREFIX/lib, include/quadruped3d        the rooms that need no LibTorch, for other projects
 # PREFIX/lib/cmake/quadruped3d           find_package(quadruped3d)
-# PREFIX/share/quadruped3d               configs, the small network, licences
+# PREFIX/share/quadruped3d               configs, the small network, licences, the bill of materials (SPDX)
 # PREFIX/share/man, bash-completion, zsh/site-functions, fish/vendor_completions.d
 #
 # No file of it holds a path of the machine that built it.
@@ -58,6 +58,15 @@ function(q3d_install_completions)
   q3d_install_output("${CMAKE_INSTALL_MANDIR}/man1" quadruped3d.1 man)
 endfunction()
 
+# What the programs are made of and need, as SPDX; made when the project is installed, from what is installed then.
+function(q3d_install_sbom)
+  install(CODE "
+    execute_process(COMMAND \"${Q3D_PIP_PYTHON}\" \"${PROJECT_SOURCE_DIR}/tools/make_sbom.py\"
+      \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}\" --version ${PROJECT_VERSION} --plotly \"${Q3D_PLOTLY}\"
+      --out \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_DATADIR}/quadruped3d/quadruped3d.spdx.json\"
+      COMMAND_ERROR_IS_FATAL ANY)")
+endfunction()
+
 function(q3d_install_package)
   set(folder "${CMAKE_INSTALL_LIBDIR}/cmake/quadruped3d")
   install(EXPORT quadruped3dTargets NAMESPACE quadruped3d:: DESTINATION ${folder})
@@ -71,6 +80,8 @@ function(q3d_install_package)
   if(PROJECT_IS_TOP_LEVEL)
     q3d_install_programs()
     q3d_install_completions()
+    include(Q3dPlotly)
+    q3d_install_sbom()
     set(CPACK_GENERATOR DEB)
     set(CPACK_PACKAGE_CONTACT "the quadruped3d contributors")
     set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "Builds 3D datasets of quadrupeds from photographs with 2D keypoints")

@@ -3,6 +3,8 @@
 usage: install_test.py BUILD SOURCE   (a built build folder and the sources)
 """
 
+import hashlib
+import json
 import pathlib
 import re
 import shutil
@@ -57,6 +59,34 @@ class Installed(unittest.TestCase):
             text = (self.prefix / "share" / file).read_text()
             self.assertTrue(text.startswith(beginning), text[:40])
             self.assertIn("evaluate", text)
+
+    def test_the_bill_of_materials_lists_what_is_installed_and_linked(self):
+        document = json.loads((self.prefix / "share/quadruped3d/quadruped3d.spdx.json").read_text())
+        self.assertEqual((document["spdxVersion"], document["dataLicense"]), ("SPDX-2.3", "CC0-1.0"))
+        self.assertEqual(document["SPDXID"], "SPDXRef-DOCUMENT")
+        self.assertRegex(document["creationInfo"]["created"], r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ$")
+        elements = {each["SPDXID"]: each for each in (*document["packages"], *document["files"])}
+        self.assertEqual(len(elements), len(document["packages"]) + len(document["files"]), "every id is there once")
+        for identifier in elements:
+            self.assertRegex(identifier, r"^SPDXRef-[A-Za-z0-9.-]+$")
+        for relation in document["relationships"]:
+            for end in ("spdxElementId", "relatedSpdxElement"):
+                self.assertIn(relation[end], {"SPDXRef-DOCUMENT", *elements})
+        files = {each["fileName"]: each["checksums"][0]["checksumValue"] for each in document["files"]}
+        installed = ["bin/quadruped3d", "libexec/quadruped3d/quadruped3d-network"]
+        installed += [str(path.relative_to(self.prefix)) for path in self.prefix.glob("share/quadruped3d/models/*.safetensors")]
+        for name in installed:
+            self.assertEqual(files["./" + name], hashlib.sha256((self.prefix / name).read_bytes()).hexdigest(), name)
+        self.assertIn("./embedded/plotly.min.js", files)
+        names = {each["name"]: each for each in document["packages"]}
+        pins = dict(re.findall(r"^([\w.-]+)==(\S+)", (SOURCE / "tools/requirements.txt").read_text(), re.M))
+        for name, version in pins.items():
+            self.assertEqual(names[name]["versionInfo"], version)
+            self.assertTrue(names[name]["checksums"])
+        for library in ("libhdf5_serial", "libopencv_core", "libtbb", "libcrypto", "libembree"):
+            path = re.search(rf"=> (/\S*{library}\S*) ", run("ldd", self.prefix / installed[1]))[1]
+            owner = run("dpkg", "-S", pathlib.Path(path).resolve()).split(":")[0]
+            self.assertEqual(names[owner]["versionInfo"], run("dpkg-query", "-W", "-f", "${Version}", owner))
 
     def test_no_program_looks_for_libraries_by_an_absolute_path(self):
         for program in (self.prefix / "bin/quadruped3d", self.prefix / "libexec/quadruped3d/quadruped3d-network"):
