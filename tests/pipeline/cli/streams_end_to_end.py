@@ -200,9 +200,13 @@ class NoFiles(Drawn):
             self.assertIn(words, details)
 
     def test_no_absolute_path_in_what_is_passed_on(self):
-        """In no file of a version, a report, an export or a part of a dataset, whatever the config's paths are."""
+        """In no file of a version, a report, an export or a part of a dataset. The config, which dataset.json repeats as
+        it was written, has none either."""
         out = self.folder / "out"
-        self.build("--quiet")
+        self.copy_of("data")
+        config = write_json(self.folder / "config.json", {"name": "drawn", "datasets": [
+            {**prima_dataset(self.shared / "data", role="2d_only"), "root": "data"}]})
+        self.build("--quiet", config=config)
         run("report", out, "--gallery", 2)
         run("subset", out, "--where", "verdict = retained", "--out", self.folder / "part")
         for kind in ("coco", "prima"):
