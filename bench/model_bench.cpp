@@ -5,6 +5,7 @@
 // MatrixRate multiplies matrices as the full-size ViT does, by LibTorch's linear and by packed matrices: its
 // rate of operations bounds the others. peak_GB is the process's largest resident size up to then. Weights
 // are seeded, the body is the synthetic quadruped, the device is `auto`.
+#include <ATen/Parallel.h>
 #include <benchmark/benchmark.h>
 #include <sys/resource.h>
 
