@@ -113,7 +113,8 @@ bool is_unchanged(const run::RunOptions& options, const UpToDateRecord& record, 
 }
 
 // Tells what a finished dataset is worth, and makes it the newest. The caller holds the folder's lock.
-void finish(const run::RunOptions& options, BuildSummary& summary, Clock::time_point start) {
+void finish(const config::BuildConfig& config, const run::RunOptions& options, BuildSummary& summary,
+            Clock::time_point start) {
   summary.dataset = dataset::read_dataset_manifest(summary.folder);
   for (const dataset::Warning& warning : summary.dataset.warnings) run::log_warning(warning.message);
   require_labels(summary.dataset, summary.folder, config.max_failed_share);
@@ -134,7 +135,7 @@ BuildSummary build(const config::BuildConfig& config, const run::RunOptions& opt
   if (ranks.leads() && !options.rebuild && is_unchanged(options, record, summary)) {
     ranks.end();
     const manifests::FolderLock lock(options.out);
-    finish(options, summary, start);
+    finish(config, options, summary, start);
     return summary;
   }
   if (!ranks.await_digests()) return summary;
@@ -160,7 +161,7 @@ BuildSummary build(const config::BuildConfig& config, const run::RunOptions& opt
     return summary;
   }
   record.keep(workspace.ingest(), summary.folder);
-  finish(options, summary, start);
+  finish(config, options, summary, start);
   return summary;
 }
 
