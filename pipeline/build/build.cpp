@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "manifests/lock.h"
@@ -96,19 +97,28 @@ std::string device_of(const config::BuildConfig& config) {
   return has_network ? network::device_key(config.network) : std::string();
 }
 
-// Fills the summary from the record of an earlier build if nothing has changed since.
+// The plan of a finished version; nothing if it is gone or damaged.
+std::optional<stages::BuildPlan> plan_of_version(const std::filesystem::path& out,
+                                                 const std::string& version) {
+  for (stages::BuildPlan& plan : stages::read_build_plans(out)) {
+    if (stages::version_name(plan.name, plan.keys) == version) return std::move(plan);
+  }
+  return std::nullopt;
+}
+
+// Fills the summary from the record of an earlier build if nothing has changed since. A build without its
+// plan goes the whole way, which writes the plan again.
 bool is_unchanged(const run::RunOptions& options, const UpToDateRecord& record, BuildSummary& summary) {
   auto found = record.unchanged();
   if (!found) return false;
+  auto plan = plan_of_version(options.out, found->folder.filename().string());
+  if (!plan) return false;
   log_candidates(found->candidates, found->units, options.quiet);
   log_notes(found->notes, options.quiet);
   summary.was_up_to_date = true;
+  summary.plan = std::move(*plan);
   summary.folder = std::move(found->folder);
   summary.notes = std::move(found->notes);
-  const std::string version = summary.folder.filename().string();
-  for (stages::BuildPlan& plan : stages::read_build_plans(options.out)) {
-    if (stages::version_name(plan.name, plan.keys) == version) summary.plan = std::move(plan);
-  }
   return true;
 }
 

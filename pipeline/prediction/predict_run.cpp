@@ -115,7 +115,7 @@ class Predictor {
       unit::predict_unit(
           work, [this]() -> device::Network& { return workspace_.network(); },
           {adaptations_ ? nullptr : &predicted_, static_cast<std::size_t>(config_.network.batch)});
-      predicted_.tell();
+      if (!adaptations_) predicted_.tell();
     }
     if (adaptations_ && !work.refined) work.refined = adapt(work);
   }

@@ -137,7 +137,8 @@ std::shared_ptr<model::PrimaNet> initial_net(const TrainingNetworkConfig& networ
 // The origin and licence of a pre-trained stem, as the initial checkpoint's metadata tell it.
 std::map<std::string, std::string> stem_origin(const TrainingNetworkConfig& network) {
   std::map<std::string, std::string> origin;
-  for (const auto& [key, value] : smal::tensors::SafeTensors::open(network.initial).metadata()) {
+  const smal::tensors::SafeTensors initial = smal::tensors::SafeTensors::open(network.initial);
+  for (const auto& [key, value] : initial.metadata()) {
     if (key.starts_with("stem_")) origin[key] = value;
   }
   return origin;

@@ -85,7 +85,7 @@ class LossesParity : public ::testing::TestWithParam<std::string> {
  protected:
   explicit LossesParity(torch::ScalarType dtype = torch::kFloat64)
       : config_(still(testing::parity_config(GetParam()))),
-        prima_(testing::parity_prima(GetParam(), config_, dtype)),
+        prima_(testing::learning_parity_prima(GetParam(), config_, dtype)),
         groups_(parameter_groups(prima_.net())),
         file_(parity_file("losses_" + GetParam())),
         meta_(meta_of("losses_" + GetParam())),

@@ -68,12 +68,18 @@ model::Prima parity_prima(const std::string& which, torch::ScalarType dtype) {
 
 model::Prima parity_prima(const std::string& which, const model::PrimaConfig& config,
                           torch::ScalarType dtype) {
+  model::Prima prima = learning_parity_prima(which, config, dtype);
+  prima.net().pack();
+  return prima;
+}
+
+model::Prima learning_parity_prima(const std::string& which, const model::PrimaConfig& config,
+                                   torch::ScalarType dtype) {
   model::configure_compute(1);  // a network this small only loses time to a second thread
   const smal::tensors::SmalAsset asset = load_parity_asset(parity_dir());
   auto net = model::load_net(parity_file("weights_" + which), config, asset, {torch::kCPU, dtype});
   net->eval();
   for (auto& parameter : net->parameters()) parameter.set_requires_grad(false);
-  net->pack();
   return {net, smal::tensors::SmalBody(asset).to_dtype(dtype)};
 }
 

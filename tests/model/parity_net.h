@@ -27,6 +27,9 @@ model::PrimaConfig parity_config(const std::string& which);
 model::Prima parity_prima(const std::string& which, torch::ScalarType dtype = torch::kFloat32);
 model::Prima parity_prima(const std::string& which, const model::PrimaConfig& config,
                           torch::ScalarType dtype = torch::kFloat32);
+// The same without packed matrices, which cannot learn.
+model::Prima learning_parity_prima(const std::string& which, const model::PrimaConfig& config,
+                                   torch::ScalarType dtype);
 
 smal::tensors::SafeTensors parity_file(const std::string& name);
 

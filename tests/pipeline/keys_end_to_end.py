@@ -28,4 +28,4 @@ class Arithmetic(Case):
 
     def test_the_key_is_told_in_words(self):
         device = self.built("out", "default")["provenance"]["device"]
-        self.assertRegex(device, r"\Acpu-1, .*, kernels (DEFAULT|NO AVX), LibTorch 2\.\d+\.\d+")
+        self.assertRegex(device, r"\Acpu-1, .*, kernels (DEFAULT|NO AVX), (packed matrices, )?LibTorch 2\.\d+\.\d+")

@@ -139,7 +139,10 @@ class UnreadablePictures(Case):
                 if not fault_lines(result.stderr):
                     break
                 with self.subTest(call=call, skip=skip):
-                    self.expect_stop(result, out, getattr(errno, name))
+                    # The last look at a picture is for the record that nothing has changed; without it, the next
+                    # build reads everything again.
+                    if result.returncode != 0 or call != "stat":
+                        self.expect_stop(result, out, getattr(errno, name))
                     self.expect_same_result(self.build(out), out)
             self.assertGreater(skip, 0, f"the program makes no call of the kind {call} on the picture")
             self.expect_same_result(result, out)

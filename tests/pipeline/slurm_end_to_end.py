@@ -52,7 +52,7 @@ class Cluster:
         key = self.folder / "munge/key"
         key.write_bytes(os.urandom(1024))
         key.chmod(0o400)
-        port = 20000 + os.getpid() % 20000
+        port = 20000 + 2 * (os.getpid() % 10000)  # two ports of its own beside another test's
         self.config = self.folder / "slurm.conf"
         self.config.write_text(CONFIG.format(folder=self.folder, controller=port, daemon=port + 1))
         self.processes = []
