@@ -1,4 +1,5 @@
-"""Dataset against the C++ feed, on the same shards: pixels to the last bit, labels to 1e-6, draws exactly."""
+"""Dataset against the C++ feed, on the same shards: pixels to the last bit without augmentation, labels to 1e-6, draws
+exactly."""
 
 import dataclasses
 import unittest
@@ -7,6 +8,11 @@ import numpy as np
 
 from support import Shards, feed_batch
 from quadruped3d import AugmentOptions, Dataset, Draw, FeedOrder
+
+# The feed decodes the part of a stored crop that an augmented patch covers. Its map to the patch starts at that part's
+# corner and is rounded there, so a few numbers differ by one level of 255 (1 / 255 / 0.224, times a colour factor of 1.2).
+ONE_LEVEL = 0.0212
+FEW = 1e-4
 
 LABELS = ("keypoints_2d", "keypoints_3d", "rotations", "betas", "has_pose", "has_betas")
 
@@ -30,12 +36,19 @@ class AgainstTheFeed(Shards):
             self.assertEqual({**drawn, "colour": list(drawn["colour"])},
                              {name: expected[name] for name in drawn})
             self.assertEqual(sample["id"], batch["ids"][slot])
-            np.testing.assert_array_equal(sample["image"], batch["image"][slot])
+            self.compare_pictures(sample["image"], batch["image"][slot], is_exact=augment is None)
             for name in LABELS:
                 np.testing.assert_allclose(sample[name], batch[name][slot], rtol=0, atol=1e-6, err_msg=name)
             self.assertEqual(sample["family"], batch["family"][slot])
             self.assertEqual(sample["species"], batch["species"][slot])
         return samples, batch
+
+    def compare_pictures(self, picture, expected, is_exact):
+        if is_exact:
+            np.testing.assert_array_equal(picture, expected)
+            return
+        np.testing.assert_allclose(picture, expected, rtol=0, atol=ONE_LEVEL)
+        self.assertLess(np.mean(picture != expected), FEW)
 
     def test_without_augmentation(self):
         for name in ("png", "jpeg"):

@@ -1,5 +1,6 @@
 """tools/slurm on a real Slurm of one node: a controller and a daemon on this machine, started by the test."""
 
+import fcntl
 import os
 import pathlib
 import shutil
@@ -45,6 +46,9 @@ class Cluster:
     """Slurm with its files in one folder, under a short path, since a socket's path may not be long."""
 
     def __init__(self):
+        # One at a time on a machine: two of them disturb each other's jobs.
+        self.only = open(pathlib.Path(tempfile.gettempdir(), "q3d_slurm_test.lock"), "w")
+        fcntl.flock(self.only, fcntl.LOCK_EX)
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="q3dslurm"))
         self.folder.chmod(0o755)
         for name in ("state", "spool", "munge"):
