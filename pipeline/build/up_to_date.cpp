@@ -43,14 +43,16 @@ std::int64_t tick_of(std::int64_t time_ns) {
   return time_ns % kNsPerSecond == 0 ? kCoarseTickNs : kTickNs;
 }
 
-// What the user asks for. The program's own stamp stands for its code.
-std::string request_digest(const config::BuildConfig& config, const config::JudgingRules& rules,
-                           const std::string& device_key) {
+// What the user asks for, and where. The program's own stamp stands for its code. In a copy of an output
+// folder, the record would speak of the files of the other one.
+std::string request_digest(const fs::path& out, const config::BuildConfig& config,
+                           const config::JudgingRules& rules, const std::string& device_key) {
   json datasets = json::array();
   for (const config::DatasetConfig& dataset : config.datasets) {
     datasets.push_back({dataset.name, dataset.split, fs::absolute(dataset.root).string()});
   }
   const json request{{"form", kForm},
+                     {"out", fs::weakly_canonical(out).string()},
                      {"config", config.as_written},
                      {"stages", stages::keys_of_config(config, rules, {}, device_key).shards},
                      {"datasets", datasets},
@@ -109,7 +111,10 @@ fs::path record_file(const fs::path& out, const std::string& request) {
 
 UpToDateRecord::UpToDateRecord(const fs::path& out, const config::BuildConfig& config,
                                const config::JudgingRules& rules, const std::string& device_key)
-    : out_(out), config_(config), request_(request_digest(config, rules, device_key)), begun_ns_(now_ns()) {}
+    : out_(out),
+      config_(config),
+      request_(request_digest(out, config, rules, device_key)),
+      begun_ns_(now_ns()) {}
 
 std::optional<UpToDateRecord::Unchanged> UpToDateRecord::unchanged() const {
   const fs::path file = record_file(out_, request_);

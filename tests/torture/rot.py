@@ -81,7 +81,7 @@ class Rot:
         path = out / self.draw.choice(self.files)
         what = f"{path}: {damage(path, self.draw)}"
         found = run("verify", out, "--stages", "--quiet", expect=None).returncode == 1
-        if not found and path.name not in _MAY_PASS_VERIFY:
+        if not found and path.name not in _MAY_PASS_VERIFY and path.suffix != ".stamps":
             raise AssertionError(f"{what}: verify did not find it")
         quality = 95
         if number % 3 == 0:

@@ -33,7 +33,7 @@ from e2e import (Fault, Scene, command, digests, draw_pictures, environment, giv
                  prima_dataset, run, write_annotations, write_json)
 
 # Files that say when or where, or that only make a later run faster.
-_NOT_COMPARED = re.compile(r"(^|/)(\.lock|digests\.txt|picture_hashes\.txt|log\.jsonl|stages/builds/.*\.json)$")
+_NOT_COMPARED = re.compile(r"(^|/)(\.lock|digests\.txt|picture_hashes\.txt|log\.jsonl|stages/builds/.*\.(json|stamps))$")
 # Journals hold one line a unit in the order in which the runs finished them.
 _JOURNAL = re.compile(r"(^|/)journal\.jsonl$")
 _TEMPORARY = re.compile(r"\.tmp$|\.safetensors\..{6}$|^latest\.tmp$")

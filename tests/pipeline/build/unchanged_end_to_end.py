@@ -69,6 +69,16 @@ class Unchanged(Case):
             self.assertEqual(path.read_bytes(), sound, file)
             self.assertTrue(self.build()["up_to_date"], file)
 
+    def test_a_copied_folder_has_stamps_of_its_own(self):
+        shutil.copytree(self.folder / "out", self.folder / "copy", symlinks=True)
+        path = latest(self.folder / "copy") / "shards/000001.h5"
+        sound = path.read_bytes()
+        flip_bit(path, 1000)
+        self.make_old()
+        again = json.loads(self.scene.build("copy", "--json", config=self.config).stdout)
+        self.assertFalse(again["up_to_date"])
+        self.assertEqual(path.read_bytes(), sound)
+
     def test_a_file_beside_the_shards_or_the_pictures_is_looked_at(self):
         (self.scene.data / "images/notes.txt").write_text("nothing of the dataset")
         self.assertGreater(self.opened("data/images/"), 0)
