@@ -163,7 +163,10 @@ def repeat(times: int, source: pathlib.Path, target: pathlib.Path) -> int:
     verdicts = hashlib.sha256((target / "verdicts.csv").read_bytes()).hexdigest()
     manifest |= {"shards": entries, "content_id": content, "key": content,
                  "verdicts": {"file": "verdicts.csv", "sha256": verdicts}}
-    (target / "dataset.json").write_text(json.dumps(manifest, indent=1) + "\n", encoding="utf-8")
+    manifest.pop("digest")
+    text = json.dumps(manifest, indent=2).removesuffix("\n}") + ",\n"
+    seal = hashlib.sha256(text.encode()).hexdigest()  # manifests/sealed_json.h
+    (target / "dataset.json").write_text(f'{text}  "digest": "{seal}"\n}}\n', encoding="utf-8")
     print(f"{target}: {len(repeated)} candidates, {manifest['counts']['retained'] + manifest['counts']['refined']} kept")
     return 0
 
