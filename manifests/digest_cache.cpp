@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <sys/stat.h>
 
 #include <charconv>
 #include <chrono>
@@ -9,12 +8,13 @@
 #include "manifests/checked_line.h"
 #include "manifests/digest.h"
 #include "manifests/file_descriptor.h"
+#include "manifests/file_stamp.h"
 #include "manifests/known_files.h"
+#include "manifests/next_field.h"
 
 namespace q3d::manifests {
 namespace {
 
-constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 constexpr std::int64_t kRacyNs = 2 * kNsPerSecond;  // FAT's mtime ticks every two seconds
 
 struct FileState {
@@ -25,23 +25,14 @@ struct FileState {
 };
 
 FileState state_of(const std::filesystem::path& path) {
-  struct stat status {};
-  if (::stat(path.c_str(), &status) != 0) throw_errno("inspect", path);
-  return {static_cast<std::uint64_t>(status.st_size),
-          status.st_mtim.tv_sec * kNsPerSecond + status.st_mtim.tv_nsec, status.st_ino};
+  const auto stamp = stamp_of(path);
+  if (!stamp) throw_errno("inspect", path);
+  return {stamp->size, stamp->mtime_ns, stamp->inode};
 }
 
 std::int64_t now_ns() {
   const auto now = std::chrono::system_clock::now().time_since_epoch();
   return std::chrono::duration_cast<std::chrono::nanoseconds>(now).count();
-}
-
-// Cuts the next field, which ends at a space, off `text`.
-std::string_view next_field(std::string_view& text) {
-  const std::size_t space = std::min(text.find(' '), text.size());
-  const std::string_view field = text.substr(0, space);
-  text.remove_prefix(std::min(space + 1, text.size()));
-  return field;
 }
 
 template <typename Integer>
@@ -64,16 +55,14 @@ void read_cached(const std::filesystem::path& file, Take&& take) {
   const std::string content = read_file(file);
   std::string_view rest = content;
   while (!rest.empty()) {
-    const std::size_t end = std::min(rest.find('\n'), rest.size());
-    const auto payload = open_line(rest.substr(0, end));
-    rest.remove_prefix(std::min(end + 1, rest.size()));
+    const auto payload = open_line(next_field(rest, '\n'));
     if (!payload) continue;
     std::string_view fields = *payload;
     CachedDigest line;
-    line.sha256 = next_field(fields);
-    if (line.sha256.size() == 64 && parse(next_field(fields), line.state.size) &&
-        parse(next_field(fields), line.state.mtime_ns) && parse(next_field(fields), line.state.inode) &&
-        !fields.empty()) {
+    line.sha256 = next_field(fields, ' ');
+    if (line.sha256.size() == 64 && parse(next_field(fields, ' '), line.state.size) &&
+        parse(next_field(fields, ' '), line.state.mtime_ns) &&
+        parse(next_field(fields, ' '), line.state.inode) && !fields.empty()) {
       line.path = fields;
       take(std::move(line));
     }

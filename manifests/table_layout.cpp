@@ -1,7 +1,6 @@
 #include "manifests/table_layout.h"
 
 #include <fmt/format.h>
-#include <sys/stat.h>
 
 #include <algorithm>
 #include <array>
@@ -11,6 +10,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "manifests/file_stamp.h"
 #include "manifests/hdf5.h"
 #include "manifests/hdf5_memory_file.h"
 #include "manifests/own_process.h"
@@ -225,20 +225,6 @@ Handle open_hdf5(const TableContent& content) {
   return {H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.get()), H5Fclose, "cannot open"};
 }
 
-// A file that was tried, as it was then.
-using FileIdentity = std::array<std::int64_t, 6>;
-
-FileIdentity identity_of(const std::filesystem::path& path) {
-  struct stat status {};
-  if (::stat(path.c_str(), &status) != 0) throw_errno("inspect", path);
-  return {static_cast<std::int64_t>(status.st_dev),
-          static_cast<std::int64_t>(status.st_ino),
-          static_cast<std::int64_t>(status.st_size),
-          status.st_mtim.tv_sec,
-          status.st_mtim.tv_nsec,
-          status.st_ctim.tv_nsec};
-}
-
 TableLayout layout_of(hid_t hdf5_file, const TableContent& content) {
   TableLayout layout;
   layout.rows = read_rows(hdf5_file);
@@ -252,17 +238,18 @@ TableLayout layout_of(hid_t hdf5_file, const TableContent& content) {
 // stages, which were compared with their digest. A Session must exist, so that no other thread holds HDF5's
 // lock when the child begins. Throws std::runtime_error if the child crashed or hung.
 void try_in_own_process(const TableContent& content) {
-  static std::set<FileIdentity> sound;  // guarded by the session's lock
+  static std::set<FileStamp> sound;  // as they were then; guarded by the session's lock
   constexpr std::chrono::seconds kMaxTime{60};
   if (content.in_memory()) return;
-  const FileIdentity identity = identity_of(content.path());
-  if (sound.contains(identity)) return;
+  const auto stamp = stamp_of(content.path());
+  if (!stamp) throw_errno("inspect", content.path());
+  if (sound.contains(*stamp)) return;
   const auto read = [&content] {
     const Handle file = open_hdf5(content);
     layout_of(file.get(), content);
   };
   if (const auto crash = trial_in_own_process(read, kMaxTime)) throw std::runtime_error(*crash);
-  sound.insert(identity);
+  sound.insert(*stamp);
 }
 
 // Calls `read(HDF5 file)` and puts the path before the message of what it throws, unless that names it.

@@ -1,7 +1,6 @@
 #include "pipeline/build/file_stamps.h"
 
 #include <fmt/format.h>
-#include <sys/stat.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
@@ -12,20 +11,17 @@
 #include <string_view>
 #include <system_error>
 
+#include "manifests/next_field.h"
+
 namespace q3d::pipeline::build {
 namespace {
 
 namespace fs = std::filesystem;
+using manifests::FileStamp;
+using manifests::next_field;
+using manifests::stamp_of;
 
-constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 constexpr std::string_view kAbsent = "absent";
-
-std::string_view next_field(std::string_view& text, char end) {
-  const std::size_t at = std::min(text.find(end), text.size());
-  const std::string_view field = text.substr(0, at);
-  text.remove_prefix(std::min(at + 1, text.size()));
-  return field;
-}
 
 template <typename Integer>
 Integer number(std::string_view text) {
@@ -38,15 +34,6 @@ Integer number(std::string_view text) {
 }
 
 }  // namespace
-
-std::optional<FileStamp> stamp_of(const fs::path& path) {
-  struct stat status {};
-  if (::stat(path.c_str(), &status) != 0) return std::nullopt;
-  return FileStamp{static_cast<std::uint64_t>(status.st_size),
-                   status.st_mtim.tv_sec * kNsPerSecond + status.st_mtim.tv_nsec,
-                   status.st_ctim.tv_sec * kNsPerSecond + status.st_ctim.tv_nsec, status.st_ino,
-                   status.st_dev};
-}
 
 std::vector<StampedFile> stamp_files(std::vector<std::string> paths) {
   std::sort(paths.begin(), paths.end());

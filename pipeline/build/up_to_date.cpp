@@ -14,6 +14,7 @@
 #include "manifests/atomic_file.h"
 #include "manifests/digest.h"
 #include "manifests/file_descriptor.h"
+#include "manifests/next_field.h"
 #include "pipeline/build/file_stamps.h"
 #include "pipeline/stages/build_plan.h"
 #include "pipeline/stages/stages.h"
@@ -31,7 +32,6 @@ constexpr std::size_t kMostEntries = 20'000'000;
 // faster; a time in whole seconds comes from a file system that has no finer ones.
 constexpr std::int64_t kTickNs = 50'000'000;
 constexpr std::int64_t kCoarseTickNs = 2'000'000'000;
-constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 
 std::int64_t now_ns() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(
@@ -40,7 +40,7 @@ std::int64_t now_ns() {
 }
 
 std::int64_t tick_of(std::int64_t time_ns) {
-  return time_ns % kNsPerSecond == 0 ? kCoarseTickNs : kTickNs;
+  return time_ns % manifests::kNsPerSecond == 0 ? kCoarseTickNs : kTickNs;
 }
 
 // What the user asks for, and where. The program's own stamp stands for its code. In a copy of an output
@@ -95,14 +95,6 @@ void let_clock_tick(const std::vector<StampedFile>& files) {
   if (wait > 0 && wait <= kCoarseTickNs) std::this_thread::sleep_for(std::chrono::nanoseconds(wait));
 }
 
-// Cuts the first line off the text, and returns it without its line feed.
-std::string_view next_line(std::string_view& text) {
-  const std::size_t end = std::min(text.find('\n'), text.size());
-  const std::string_view line = text.substr(0, end);
-  text.remove_prefix(std::min(end + 1, text.size()));
-  return line;
-}
-
 fs::path record_file(const fs::path& out, const std::string& request) {
   return stages::plans_folder(out) / (request.substr(0, stages::kShortKey) + ".stamps");
 }
@@ -121,9 +113,9 @@ std::optional<UpToDateRecord::Unchanged> UpToDateRecord::unchanged() const {
   if (config_.leakage || !fs::exists(file)) return std::nullopt;
   const std::string content = manifests::read_file(file);
   std::string_view text = content;
-  const std::string_view head = next_line(text);
+  const std::string_view head = manifests::next_field(text, '\n');
   if (head != manifests::sha256(text) + ' ' + request_) return std::nullopt;
-  const json said = json::parse(next_line(text));
+  const json said = json::parse(manifests::next_field(text, '\n'));
   if (!have_stamps(stamps_from_text(text))) return std::nullopt;
   Unchanged found{out_ / said.at("folder").get<std::string>(),
                   {},

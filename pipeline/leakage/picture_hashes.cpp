@@ -15,6 +15,7 @@
 #include "loaders/pictures/perceptual_hash.h"
 #include "manifests/atomic_file.h"
 #include "manifests/checked_line.h"
+#include "manifests/next_field.h"
 #include "pipeline/run/interrupt.h"
 #include "pipeline/run/progress.h"
 
@@ -65,9 +66,7 @@ PictureHashes::PictureHashes(std::filesystem::path file) : file_(std::move(file)
   const std::size_t prefix = kMethod.size() + 1;
   std::string_view rest = content;
   while (!rest.empty()) {
-    const std::size_t end = std::min(rest.find('\n'), rest.size());
-    const auto payload = manifests::open_line(rest.substr(0, end));
-    rest.remove_prefix(std::min(end + 1, rest.size()));
+    const auto payload = manifests::open_line(manifests::next_field(rest, '\n'));
     if (!payload || !payload->starts_with(kMethod) || payload->size() < prefix + kShaDigits + 2) continue;
     const std::size_t key_end = payload->find(' ', prefix);
     if (key_end == std::string_view::npos || key_end - prefix < kShaDigits) continue;
