@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "model/vectorised.h"
+
 namespace q3d::model {
 namespace {
 
@@ -13,7 +15,7 @@ constexpr double kBeta1 = 0.9;
 constexpr double kBeta2 = 0.999;
 constexpr double kEpsilon = 1e-8;
 
-// What of a step depends on the instance's number of steps.
+// The factors of a step that depend on the instance's number of steps.
 struct Rates {
   float step;           // learning rate / (1 - beta1^n)
   float inverse_root2;  // 1 / sqrt(1 - beta2^n)
@@ -25,16 +27,7 @@ Rates rates_after(std::int64_t steps, double learning_rate) {
           static_cast<float>(1.0 / std::sqrt(1.0 - std::pow(kBeta2, n)))};
 }
 
-// Compiled for several instruction sets, of which the program takes the processor's own when it starts.
-// Without no-math-errno a square root could set errno, which keeps the loop from being vectorised.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
-#define Q3D_FOR_EACH_PROCESSOR \
-  __attribute__((target_clones("default", "avx2", "avx512f"), optimize("O3", "no-math-errno")))
-#else
-#define Q3D_FOR_EACH_PROCESSOR
-#endif
-
-Q3D_FOR_EACH_PROCESSOR
+Q3D_VECTORISED
 void step_row(float* __restrict parameter, float* __restrict first, float* __restrict second,
               const float* __restrict gradient, std::int64_t count, Rates rates) {
   constexpr auto kFirst = static_cast<float>(kBeta1);
@@ -50,7 +43,7 @@ void step_row(float* __restrict parameter, float* __restrict first, float* __res
   }
 }
 
-Q3D_FOR_EACH_PROCESSOR
+Q3D_VECTORISED
 void add_scaled(float* __restrict sum, const float* __restrict row, float scale, std::int64_t count) {
   for (std::int64_t i = 0; i < count; ++i) sum[i] += scale * row[i];
 }

@@ -7,19 +7,13 @@
 #include <array>
 #include <vector>
 
+#include "model/vectorised.h"
+
 namespace q3d::model {
 namespace {
 
 // Channels that a loop treats together: four registers of AVX-512 hold their sums.
 constexpr std::int64_t kLanes = 64;
-
-// Compiled for each of these instruction sets; the processor chooses when the program starts. Clang writes
-// such a list in another way; there, the loops are compiled once.
-#if defined(__x86_64__) && !defined(__clang__)
-#define Q3D_VECTORISED __attribute__((target_clones("avx512f", "avx2,fma", "default")))
-#else
-#define Q3D_VECTORISED
-#endif
 
 // sums[c] += left[n][c] * right[n * step][c] for `count` pixels n.
 Q3D_VECTORISED void add_products(float* sums, const float* left, const float* right, std::int64_t count,
