@@ -8,7 +8,7 @@
 #include <chrono>
 #include <cmath>
 #include <memory>
-#include <span>
+#include <utility>
 
 #include "manifests/digest.h"
 #include "pipeline/build/prediction_progress.h"
@@ -131,16 +131,14 @@ class Predictor {
       request.schedule.iterations = options_.iterations;
       samples.emplace_back().sample = i;
     }
-    const auto batch = static_cast<std::size_t>(config_.tta.batch);
-    for (std::size_t start = 0; start < requests.size(); start += batch) {
-      const std::size_t count = std::min(batch, requests.size() - start);
-      std::vector<device::AdaptOutcome> outcomes =
-          workspace_.network().adapt(std::span(requests).subspan(start, count));
-      for (std::size_t j = 0; j < outcomes.size(); ++j) {
-        samples[start + j].curve = std::move(outcomes[j].curve);
-        samples[start + j].body = outcomes[j].best;
-      }
-      progress_.advance(static_cast<std::int64_t>(count));
+    if (requests.empty()) return samples;
+    std::vector<device::AdaptOutcome> outcomes =
+        workspace_.network().adapt(requests, {}, [this, told = std::size_t{0}](std::size_t ended) mutable {
+          progress_.advance(static_cast<std::int64_t>(ended - std::exchange(told, ended)));
+        });
+    for (std::size_t j = 0; j < outcomes.size(); ++j) {
+      samples[j].curve = std::move(outcomes[j].curve);
+      samples[j].body = outcomes[j].best;
     }
     return samples;
   }
