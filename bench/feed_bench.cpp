@@ -71,7 +71,7 @@ void write_made_shard(const fs::path& path) {
   manifests::write_shard(path, header, samples);
 }
 
-// Of all threads. It says more than wall time where other programs share the machine.
+// Returns the CPU time of all threads. It says more than wall time where other programs share the machine.
 double cpu_seconds() {
   return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
 }

@@ -19,7 +19,7 @@ torch::Tensor activate(const torch::Tensor& x, Activation activation);
 // runs.
 bool packs_matrices(torch::Device device, torch::ScalarType dtype);
 
-// What packs_matrices says of a CPU, for the stage keys: "packed matrices", or empty.
+// Returns what the stage keys say of the rule on a CPU: "packed matrices", or nothing.
 std::string packing_name();
 
 // x -> x W^T + b. It cannot learn: gradients flow to x alone.

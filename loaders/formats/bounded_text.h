@@ -6,7 +6,7 @@
 
 namespace q3d::loaders::formats {
 
-// As long as a path may be on Linux.
+// A path on Linux may be as long as this.
 inline constexpr std::size_t kMaxTextBytes = 4096;
 
 // Returns the text; one of more than kMaxTextBytes is shortened to its first 200 bytes, "~" and 12 digits of

@@ -30,9 +30,9 @@ class SharedStore {
   // counter that only grows.
   virtual std::int64_t add(const std::string& key, std::int64_t value) = 0;
   virtual void set(const std::string& key, const std::string& value) = 0;
-  // Nothing if no rank has set the key.
+  // Returns nothing if no rank has set the key.
   virtual std::optional<std::string> get(const std::string& key) = 0;
-  // In one exchange. All keys must have been set.
+  // Returns all values in one exchange. All keys must have been set.
   virtual std::vector<std::string> get_all(const std::vector<std::string>& keys) = 0;
 };
 

@@ -141,7 +141,7 @@ UnitClaims::Remainder UnitClaims::remainder() {
     copied.insert(copied.end(), word.copied.begin(), word.copied.end());
   }
   {
-    // What counts is how soon this rank would make the unit. The slow rank's own times say nothing of that.
+    // This rank compares with its own times, since they tell how soon it would make the unit itself.
     const std::lock_guard lock(mutex_);
     if (longest_.count() > 0.0) longest = longest_;
   }

@@ -25,17 +25,18 @@ using ClaimClock = std::chrono::steady_clock;
 using ClaimSeconds = std::chrono::duration<double>;
 
 struct ClaimRules {
-  ClaimSeconds beat{1.0};        // between two signs of life; claims_rules() lengthens it for many ranks
+  ClaimSeconds beat{1.0};        // between two signs of life; claim_rules() lengthens it for many ranks
   double lost_after_beats = 15;  // a rank without a sign of life for so long has died
-  double slow_factor =
-      3.0;  // a unit is slow that is open for so many times the longest of the idle rank's units ...
-  ClaimSeconds least_slow{10.0};  // ... and at least for this long
+  // A unit is slow that is open for so many times the longest of the idle rank's units, and at least for
+  // least_slow.
+  double slow_factor = 3.0;
+  ClaimSeconds least_slow{10.0};
 };
 
 // Rules that keep the store's load bounded, whatever the number of ranks.
 ClaimRules claim_rules(int ranks);
 
-// What a rank tells of a finished unit, such as its numbers of verdicts; the ranks' sums are told in the end.
+// A rank tells these numbers of each finished unit, such as its numbers of verdicts. They are added up.
 using Tally = std::array<std::int64_t, 4>;
 
 // Thread-safe. Functions that ask the store throw StoreLost.
