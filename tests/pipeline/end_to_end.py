@@ -11,12 +11,12 @@ import h5py
 import numpy as np
 from PIL import Image
 
-from e2e import (PICTURES, UNIT, Case, Fault, Scene, alarm_seconds, digests, draw_pictures, flip_bit, journal_lines,
-                 kill_and_resume, latest, make_network, prima_dataset, run, run_json, split_safetensors, stamps,
-                 started, verdicts, write_annotations, write_json, write_safetensors)
+from e2e import (PICTURES, UNIT, Fault, Scene, SceneCase, alarm_seconds, digests, draw_pictures, flip_bit, journal_lines,
+                 kill_and_resume, latest, make_network, prima_dataset, run, run_json, split_safetensors, stamps, started,
+                 verdicts, write_annotations, write_json, write_safetensors)
 
 
-class EndToEnd(Case):
+class EndToEnd(SceneCase):
     @classmethod
     def prepare(cls):
         scene = Scene.make(cls.shared)
@@ -26,10 +26,6 @@ class EndToEnd(Case):
     def recall(cls):
         cls.summary = json.loads((cls.shared / "summary.json").read_text())
         cls.dataset = latest(cls.shared / "out")
-
-    def setUp(self):
-        super().setUp()
-        self.scene = Scene(self.shared, self.folder)
 
     # --- the main job
 

@@ -6,7 +6,7 @@ import struct
 import subprocess
 import zlib
 
-from e2e import (LIMIT_S, Case, Fault, command, draw_pictures, environment, latest, make_network, prima_dataset, run,
+from e2e import (LIMIT_S, DrawnCase, Fault, command, environment, latest, make_network, prima_dataset, run,
                  split_safetensors, verdicts, write_annotations, write_json, write_safetensors)
 
 MEGA = 1 << 20
@@ -31,14 +31,7 @@ def jpeg_that_claims(width, height):
     return b"\xff\xd8" + tables + b"\xff\xc2" + struct.pack(">H", 2 + len(frame)) + frame + scan + b"\xff\xd9"
 
 
-class Hostile(Case):
-    @classmethod
-    def prepare(cls):
-        write_annotations(cls.shared / "data", draw_pictures(cls.shared / "data", 3))
-        write_json(cls.shared / "config.json",
-                   {"name": "drawn", "datasets": [prima_dataset(cls.shared / "data", role="2d_only")]})
-        run("build", "--config", cls.shared / "config.json", "--out", cls.shared / "out")
-
+class Hostile(DrawnCase):
     def setUp(self):
         super().setUp()
         self.data = self.copy_of("data")

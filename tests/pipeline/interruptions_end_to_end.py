@@ -4,18 +4,17 @@ import os
 import signal
 import subprocess
 
-from e2e import (LIMIT_S, Case, Fault, Scene, alarm_seconds, command, digests, draw_pictures, environment, latest,
+from e2e import (LIMIT_S, Fault, Scene, SceneCase, alarm_seconds, command, digests, draw_pictures, environment, latest,
                  prima_dataset, run, started, write_annotations)
 
 
-class Interruptions(Case):
+class Interruptions(SceneCase):
     @classmethod
     def prepare(cls):
         Scene.make(cls.shared).build("out")
 
     def setUp(self):
         super().setUp()
-        self.scene = Scene(self.shared, self.folder)
         self.dataset = latest(self.shared / "out")
 
     def test_each_signal_has_its_exit_code(self):

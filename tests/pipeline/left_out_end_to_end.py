@@ -7,7 +7,7 @@ import shutil
 import numpy as np
 from PIL import Image
 
-from e2e import (Case, Scene, latest, prima_dataset, read_csv, read_samples, run, run_json, smooth_picture, stamps,
+from e2e import (Scene, SceneCase, latest, prima_dataset, read_csv, read_samples, run, run_json, smooth_picture, stamps,
                  verdicts, write_annotations, write_json)
 
 
@@ -21,7 +21,7 @@ def square_box(box):
     return (2 * x + w) // 2, (2 * y + h) // 2, max(w, h)
 
 
-class LeftOut(Case):
+class LeftOut(SceneCase):
     @classmethod
     def prepare(cls):
         Scene.make(cls.shared).build("out")
@@ -30,10 +30,6 @@ class LeftOut(Case):
     def recall(cls):
         cls.dataset = latest(cls.shared / "out")
         cls.rows = verdicts(cls.dataset)
-
-    def setUp(self):
-        super().setUp()
-        self.scene = Scene(self.shared, self.folder)
 
     def explain(self, sample, *more, dataset=None, expect=0):
         return run("explain", dataset or self.shared / "out", sample, *more, expect=expect)

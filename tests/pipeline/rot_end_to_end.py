@@ -6,7 +6,7 @@ import os
 
 import h5py
 
-from e2e import (UNIT, Case, Fault, Scene, digests, draw_pictures, fault_lines, file_sha256, flip_bit, latest,
+from e2e import (UNIT, Case, Fault, Scene, SceneCase, digests, draw_pictures, fault_lines, file_sha256, flip_bit, latest,
                  prima_dataset, run, run_json, units_in_journals, verdicts, write_annotations, write_json)
 
 
@@ -16,7 +16,7 @@ def byte_of_column(path, name):
         return file[name].id.get_offset() + file[name].id.get_storage_size() // 2
 
 
-class DamagedStages(Case):
+class DamagedStages(SceneCase):
     """One bit of a stage's file flips after the build. A later build must not take the file: it names it and makes the
     unit anew, so that it ends as if nothing had happened."""
 
@@ -32,7 +32,6 @@ class DamagedStages(Case):
     def setUp(self):
         super().setUp()
         self.out = self.copy_of("out")
-        self.scene = Scene(self.shared, self.folder)
 
     def units(self, stage):
         """The stage's files in this test's output folder, by unit."""

@@ -7,7 +7,7 @@ import socket
 import subprocess
 import sys
 
-from e2e import LIMIT_S, Case, Fault, Scene, command, digests, environment, prima_dataset, run, wait_until
+from e2e import LIMIT_S, Fault, Scene, SceneCase, command, digests, environment, prima_dataset, run, wait_until
 
 
 def free_port():
@@ -53,16 +53,13 @@ class Rank:
 FIRST_SHARD_OF_RANK_0 = 2
 
 
-class SharedBuild(Case):
+class SharedBuild(SceneCase):
     @classmethod
     def prepare(cls):
-        scene = Scene.make(cls.shared)
-        scene.write_config("fine.json", shards={"unit_size": 2})
-        scene.build("one", config=cls.shared / "fine.json")
+        Scene.make(cls.shared).build_in_small_units("one")
 
     def setUp(self):
         super().setUp()
-        self.scene = Scene(self.shared, self.folder)
         self.config = self.shared / "fine.json"
 
     def words(self, out, *more, config=None):

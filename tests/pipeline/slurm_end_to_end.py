@@ -9,7 +9,7 @@ import tempfile
 import time
 import unittest
 
-from e2e import (LIMIT_S, Case, Fault, Scene, digests, draw_pictures, environment, give_bodies, make_network,
+from e2e import (LIMIT_S, Fault, Scene, SceneCase, digests, draw_pictures, environment, give_bodies, make_network,
                  prima_dataset, program, run, wait_until, write_annotations, write_json)
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -99,16 +99,13 @@ class Cluster:
 @unittest.skipUnless(all(shutil.which(name) for name in NEEDED),
                      "Slurm is not installed; apt-get install slurmctld slurmd slurm-client munge")
 @unittest.skipUnless(os.geteuid() == 0, "slurmd starts tasks as their user, for which it must be root")
-class Slurm(Case):
+class Slurm(SceneCase):
     @classmethod
     def prepare(cls):
-        scene = Scene.make(cls.shared)
-        scene.write_config("fine.json", shards={"unit_size": 2})
-        scene.build("one", config=cls.shared / "fine.json")
+        Scene.make(cls.shared).build_in_small_units("one")
 
     def setUp(self):
         super().setUp()
-        self.scene = Scene(self.shared, self.folder)
         self.cluster = Cluster()
         self.addCleanup(self.cluster.end)
 

@@ -4,7 +4,7 @@ import json
 import pathlib
 import shutil
 
-from e2e import (Case, Fault, Scene, digests, kept, kill_and_resume, run, run_json, verdicts, write_json)
+from e2e import Fault, Scene, SceneCase, digests, kept, kill_and_resume, run, run_json, verdicts, write_json
 
 
 def kept_ids(dataset):
@@ -21,7 +21,7 @@ def rows_in_crops(out):
     return sum(rows.values())
 
 
-class Crops(Case):
+class Crops(SceneCase):
     @classmethod
     def prepare(cls):
         scene = Scene.make(cls.shared)
@@ -35,7 +35,6 @@ class Crops(Case):
 
     def setUp(self):
         super().setUp()
-        self.scene = Scene(self.shared, self.folder)
         self.fresh = {name: (self.shared / f"fresh_{name}" / "latest").resolve()
                       for name in ("narrow", "middle", "wide")}
 

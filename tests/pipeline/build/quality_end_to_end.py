@@ -4,8 +4,8 @@ import json
 import os
 import pathlib
 
-from e2e import (Case, Scene, draw_pictures, latest, prima_dataset, render_world, run, run_json, world_animal3d,
-                 world_body, write_annotations, write_json)
+from e2e import (Case, Scene, SceneCase, draw_pictures, latest, prima_dataset, render_world, run, run_json,
+                 world_animal3d, world_body, write_annotations, write_json)
 
 SHIPPED = pathlib.Path(__file__).parents[3] / "models" / "small.safetensors"
 
@@ -62,14 +62,10 @@ class Quality(Case):
         self.assertIn("of the crop's side", summary["quality"])
 
 
-class NothingKept(Case):
+class NothingKept(SceneCase):
     @classmethod
     def prepare(cls):
         Scene.make(cls.shared).build("out")
-
-    def setUp(self):
-        super().setUp()
-        self.scene = Scene(self.shared, self.folder)
 
     def test_a_build_without_a_label_leaves_latest_where_it_was(self):
         out = self.copy_of("out")

@@ -6,19 +6,14 @@ import re
 import shutil
 import time
 
-from e2e import Case, Fault, Scene, flip_bit, latest, verdicts
+from e2e import Fault, SceneCase, flip_bit, latest, verdicts
 
 
-class Unchanged(Case):
-    @classmethod
-    def prepare(cls):
-        Scene.make(cls.shared)
-
+class Unchanged(SceneCase):
     def setUp(self):
         super().setUp()
         # Its own pictures, since tests change them.
         shutil.copytree(self.shared / "data", self.folder / "data")
-        self.scene = Scene(self.shared, self.folder)
         self.scene.data = self.folder / "data"
         self.veto = self.folder / "veto.txt"
         self.veto.write_text("")

@@ -8,20 +8,11 @@ import shutil
 import signal
 import subprocess
 
-from e2e import (Case, Fault, command, draw_pictures, environment, latest, prima_dataset, run, verdicts,
-                 write_annotations, write_json)
+from e2e import (DrawnCase, Fault, command, environment, latest, prima_dataset, run, verdicts, write_annotations,
+                 write_json)
 
 
-class Drawn(Case):
-    """Three drawn pictures with keypoints, and a finished dataset of them."""
-
-    @classmethod
-    def prepare(cls):
-        write_annotations(cls.shared / "data", draw_pictures(cls.shared / "data", 3))
-        write_json(cls.shared / "config.json",
-                   {"name": "drawn", "datasets": [prima_dataset(cls.shared / "data", role="2d_only")]})
-        run("build", "--config", cls.shared / "config.json", "--out", cls.shared / "out")
-
+class Drawn(DrawnCase):
     def build(self, *more, config=None, **options):
         return run("build", "--config", config or self.shared / "config.json", "--out", self.folder / "out", *more,
                    **options)

@@ -11,7 +11,7 @@ import subprocess
 import termios
 import threading
 
-from e2e import PICTURES, UNIT, Case, Fault, Scene, verdicts
+from e2e import PICTURES, UNIT, Fault, SceneCase, verdicts
 from e2e.program import LIMIT_S, Started, command, environment
 
 UNITS = PICTURES // UNIT
@@ -55,15 +55,7 @@ class OnTerminal(Started):
         os.close(self._master)
 
 
-class Progress(Case):
-    @classmethod
-    def prepare(cls):
-        Scene.make(cls.shared)
-
-    def setUp(self):
-        super().setUp()
-        self.scene = Scene(self.shared, self.folder)
-
+class Progress(SceneCase):
     def words(self, *more):
         return command(self.scene.build_words("out", *more))
 

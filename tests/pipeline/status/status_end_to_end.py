@@ -6,7 +6,7 @@ import shlex
 import shutil
 import signal
 
-from e2e import (PICTURES, UNIT, Case, Fault, Scene, digests, flip_bit, latest, run, run_json, started,
+from e2e import (PICTURES, UNIT, Fault, Scene, SceneCase, digests, flip_bit, latest, run, run_json, started,
                  units_in_journals, verdicts)
 
 UNITS = PICTURES // UNIT
@@ -18,14 +18,13 @@ def stages_of(build):
     return {stage["stage"]: stage for stage in build["stages"]}
 
 
-class Status(Case):
+class Status(SceneCase):
     @classmethod
     def prepare(cls):
         Scene.make(cls.shared).build("out")
 
     def setUp(self):
         super().setUp()
-        self.scene = Scene(self.shared, self.folder)
         self.out = self.folder / "out"
 
     def only_build(self, out):
@@ -173,7 +172,7 @@ class Status(Case):
         self.assertIn("expected an output folder", run("status", self.folder, expect=1).stderr)
 
 
-class Until(Case):
+class Until(SceneCase):
     """Builds that stop after a stage."""
 
     @classmethod
@@ -182,7 +181,6 @@ class Until(Case):
 
     def setUp(self):
         super().setUp()
-        self.scene = Scene(self.shared, self.folder)
         self.whole = digests(latest(self.shared / "whole"))
         self.names = list(stages_of(run_json("status", self.shared / "whole")["builds"][0]))
 
@@ -251,7 +249,7 @@ class Until(Case):
         self.assertFalse((self.folder / "out").exists())
 
 
-class DryRun(Case):
+class DryRun(SceneCase):
     """What a build would make, against what it then makes."""
 
     @classmethod
@@ -260,7 +258,6 @@ class DryRun(Case):
 
     def setUp(self):
         super().setUp()
-        self.scene = Scene(self.shared, self.folder)
         self.out = self.folder / "out"
 
     def forecast(self, *more, **options):

@@ -5,7 +5,7 @@ __main__.py, which also tells it where the program is. The parts:
 
     case       Case: tests that share one expensive folder and write only into a folder of their own
     program    run and start the program; make it stop, hang or fail at an exact point; kill and resume it
-    scene      Scene: drawn pictures, a tiny network, a config and calibrated thresholds
+    scene      Scene: drawn pictures, a tiny network, a config and calibrated thresholds; cases that share one
     pictures   draw pictures and annotations, give bodies to annotations, make networks and the rendered world
     intake     IntakeCase: label files as people have them, over pictures with a dot at each keypoint
     pages      cut the files and commands out of a page of docs
@@ -19,6 +19,6 @@ from .datasets import (copy_folder, digests, file_sha256, flip_bit, journal_line
                        units_in_journals, verdicts, write_safetensors)
 from .pictures import (FOCAL, draw_pictures, give_bodies, make_network, prima_dataset, render_world, smooth_picture,
                        world_animal3d, world_body, world_superanimal, write_annotations, write_json)
-from .program import (LIMIT_S, Fault, alarm_seconds, command, environment, fault_lines, kill_and_resume, program, run, run_json, started,
-                      wait_until)
-from .scene import PICTURES, UNIT, Scene
+from .program import (LIMIT_S, Fault, alarm_seconds, command, environment, fault_lines, kill_and_resume, program, run,
+                      run_json, started, wait_until)
+from .scene import PICTURES, UNIT, DrawnCase, Scene, SceneCase

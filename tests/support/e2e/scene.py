@@ -2,6 +2,7 @@
 
 import json
 
+from .case import Case
 from .datasets import latest
 from .pictures import draw_pictures, make_network, prima_dataset, write_annotations, write_json
 from .program import run
@@ -72,6 +73,33 @@ class Scene:
         """Builds into folder/out. `options` go to run()."""
         return run(*self.build_words(out, *more, config=config), **options)
 
+    def build_in_small_units(self, out):
+        """Builds into folder/out by the config fine.json, which it writes, in units of two candidates."""
+        return self.build(out, config=self.write_config("fine.json", shards={"unit_size": 2}))
+
     def latest(self, out):
         """The newest dataset in folder/out."""
         return latest(self.folder / out)
+
+
+class SceneCase(Case):
+    """Tests that share a scene, each with output folders of its own."""
+
+    @classmethod
+    def prepare(cls):
+        Scene.make(cls.shared)
+
+    def setUp(self):
+        super().setUp()
+        self.scene = Scene(self.shared, self.folder)
+
+
+class DrawnCase(Case):
+    """Tests that share three drawn pictures with keypoints, and a finished dataset of them."""
+
+    @classmethod
+    def prepare(cls):
+        write_annotations(cls.shared / "data", draw_pictures(cls.shared / "data", 3))
+        write_json(cls.shared / "config.json",
+                   {"name": "drawn", "datasets": [prima_dataset(cls.shared / "data", role="2d_only")]})
+        run("build", "--config", cls.shared / "config.json", "--out", cls.shared / "out")
