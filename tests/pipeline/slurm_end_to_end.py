@@ -67,7 +67,7 @@ class Cluster:
         wait_until((self.folder / "munge.sock").exists, "munged")
         self.start("slurmctld", "-D", "-f", self.config)
         self.start("slurmd", "-D", "-N", "localhost", "-f", self.config)
-        wait_until(lambda: "idle" in self.ask("sinfo", "-h", "-o", "%t", check=False), "the node to be idle")
+        wait_until(self.is_idle, "the node to be idle")
 
     def start(self, *words):
         log = open(self.folder / f"{words[0]}.log", "w")
@@ -84,9 +84,21 @@ class Cluster:
             raise AssertionError(f"{words}: {result.stderr}")
         return result.stdout
 
-    def state(self, job):
+    def is_idle(self):
+        """Whether no job is on the node, nor what is left of one."""
+        return "idle" in self.ask("sinfo", "-h", "-o", "%t", check=False)
+
+    def shown(self, job, field):
+        """A field of `scontrol show job`."""
         words = self.ask("scontrol", "show", "job", job, "-o").split()
-        return next(word.split("=", 1)[1] for word in words if word.startswith("JobState="))
+        return next(word.split("=", 1)[1] for word in words if word.startswith(field + "="))
+
+    def state(self, job):
+        return self.shown(job, "JobState")
+
+    def restarts(self, job):
+        """How often the job was queued again."""
+        return int(self.shown(job, "Restarts"))
 
     def end(self):
         for process in reversed(self.processes):
@@ -125,21 +137,39 @@ class Slurm(SceneCase):
         return self.cluster.ask("sbatch", "--parsable", "--ntasks=2", f"--output={self.log}",
                                 ROOT / "tools/slurm" / script, *words, env=env).strip()
 
+    def said(self):
+        """What the job has written so far."""
+        return self.log.read_text() if self.log.exists() else ""
+
     def wait_for(self, job, state):
         def reached():
             now = self.cluster.state(job)
-            self.assertFalse(now in ("COMPLETED", "FAILED") and now != state,
-                             f"{now}\n{self.log.read_text() if self.log.exists() else ''}")
+            self.assertFalse(now in ("COMPLETED", "FAILED") and now != state, f"{now}\n{self.said()}")
             return now == state
 
         wait_until(reached, f"job {job} to be {state}")
 
-    def signal_and_wait_for_requeue(self, job):
-        wait_until(lambda: self.log.exists() and self.log.read_text().count("faults: hang") >= 1, "a rank to be at work")
+    def wait_until_a_rank_hangs(self, job):
+        def hangs():
+            if "faults: hang" in self.said():
+                return True
+            now = self.cluster.state(job)
+            self.assertIn(now, ("PENDING", "CONFIGURING", "RUNNING"), f"no rank came to its fault\n{self.said()}")
+            return False
+
+        wait_until(hangs, "a rank to be at work")
+
+    def preempt_and_complete(self, job):
+        """Ends the first start of the job by SIGTERM and waits until another start completes it."""
+        self.wait_until_a_rank_hangs(job)
         self.cluster.ask("scancel", "--signal=TERM", job)
         self.wait_for(job, "PENDING")
-        # Slurm holds a job back for two minutes before it starts it again.
-        self.cluster.ask("scontrol", "update", f"JobId={job}", "StartTime=now")
+        # Slurm holds the job back for two minutes, and the test for a few seconds. The node must be free of the first
+        # start, and it refuses a start in the second in which the one before was ended ("job credential revoked").
+        wait_until(self.cluster.is_idle, "the first start to end")
+        self.cluster.ask("scontrol", "update", f"JobId={job}", "StartTime=now+3")
+        self.wait_for(job, "COMPLETED")
+        self.assertEqual(self.cluster.restarts(job), 1)
 
     def files(self, out):
         return {name: digest for name, digest in digests(out).items()
@@ -153,9 +183,7 @@ class Slurm(SceneCase):
     def test_a_build_that_is_preempted_is_queued_again_and_completes(self):
         words = self.scene.build_words("out", config=self.shared / "fine.json")[1:]
         script = self.program_that(Fault("shards-", "sync", "hang", skip=4))
-        job = self.submit("build.sbatch", *words, quadruped3d=script)
-        self.signal_and_wait_for_requeue(job)
-        self.wait_for(job, "COMPLETED")
+        self.preempt_and_complete(self.submit("build.sbatch", *words, quadruped3d=script))
         self.assertEqual(self.files(self.folder / "out"), self.files(self.shared / "one"))
 
     def test_a_training_that_is_preempted_goes_on_from_its_state(self):
@@ -177,8 +205,7 @@ class Slurm(SceneCase):
         script = self.program_that(Fault("state.safetensors", "sync", "hang", skip=2))
         job = self.submit("train.sbatch", "--config", config, "--stage", "1", "--out", folder / "run",
                           quadruped3d=script)
-        self.signal_and_wait_for_requeue(job)
-        self.wait_for(job, "COMPLETED")
+        self.preempt_and_complete(job)
         steps = [line for line in (folder / "run/log.jsonl").read_text().splitlines() if line]
         self.assertEqual(len(steps), 6)
         self.assertTrue((folder / "run/model.safetensors").exists())
