@@ -1,4 +1,4 @@
-// What every reader of a dataset.json checks, whatever it takes from it.
+// The checks that every reader of a dataset.json makes before it uses a value.
 #pragma once
 
 #include <filesystem>

@@ -1,5 +1,5 @@
-// What this process asks of the file system. Some cannot do it: network disks without locks, and those that
-// refuse to sync. The command line's --no-sync and --no-lock say that the user goes on without.
+// Whether this process syncs and locks its files. Some network disks can do neither; the command line's
+// --no-sync and --no-lock go on without.
 #pragma once
 
 #include <filesystem>

@@ -19,10 +19,10 @@ struct DeviceChoice {
 // be used.
 DeviceChoice choose_device(const std::string& name, int local_rank = 0);
 
-// What of the machine and the library decides the last bits of a result on this device: the CPU's vendor, its
-// instruction sets, the one that LibTorch's own kernels use, limits that the environment sets for oneDNN and
-// MKL, or the GPU's model; and LibTorch's version. Equal texts promise equal bits at equal thread counts.
-// "intel avx512_bf16, kernels AVX512, packed matrices, LibTorch 2.11.0", "NVIDIA H200, LibTorch 2.11.0".
+// Describes what decides the last bits of a result on this device: the CPU's vendor, its instruction sets,
+// the one that LibTorch's own kernels use, limits that the environment sets for oneDNN and MKL, or the GPU's
+// model; and LibTorch's version. Equal texts promise equal bits at equal thread counts. Examples: "intel
+// avx512_bf16, kernels AVX512, packed matrices, LibTorch 2.11.0", "NVIDIA H200, LibTorch 2.11.0".
 std::string arithmetic_of(const DeviceChoice& choice);
 
 // Reproducible kernels, the number of threads a CPU operator may use, and memory that stays with the process

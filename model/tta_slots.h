@@ -19,7 +19,7 @@ struct KeypointTargets {
   torch::Tensor fitted;
 };
 
-// What a slot needs of its instance besides the parameters.
+// The inputs of one instance that a slot needs besides the parameters.
 struct SlotInputs {
   DecoderMemory memory;
   torch::Tensor initial_betas;

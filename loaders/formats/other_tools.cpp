@@ -14,7 +14,7 @@ namespace {
 
 using nlohmann::json;
 
-// Where the keys of a form stand.
+// The place in a document where the keys of a form are looked for.
 enum class Place { document, first_of_list, first_value };
 
 struct Form {

@@ -62,7 +62,7 @@ class UnitClaims {
     std::optional<std::int64_t> unit;  // of another rank, for this one to make as well
     bool is_finished = false;          // no rank that lives has a unit open that no other has made
   };
-  // What is left when next() gives nothing and this rank has no unit open.
+  // Says what other ranks still do, when next() gives nothing and this rank has no unit open.
   Remainder remainder();
 
   // The unit's files and its journal lines are on disk.

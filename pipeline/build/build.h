@@ -15,7 +15,7 @@
 
 namespace q3d::pipeline::build {
 
-// What a build is asked beside its config and the run's options.
+// Options of a build that neither its config nor the run's options hold.
 struct BuildRequest {
   // The last stage that the run makes; nothing: all stages, and the finished dataset. A later run goes on
   // from there and ends with the same bytes as one run.

@@ -118,7 +118,7 @@ std::vector<Scored> score_pool(const config::BuildConfig& config, Workspace& wor
   return scored;
 }
 
-// What must be the same in all ranks.
+// A digest of everything that all ranks must have in common.
 std::string key_of_predictions(const config::BuildConfig& config, const Workspace& workspace) {
   std::string text = stages::predict_key(config, workspace.assets(), workspace.device_key());
   for (const candidates::Unit& unit : workspace.ingest().units) text += '\n' + unit.input_digest;

@@ -46,7 +46,7 @@ class Forecaster {
     return {out_, std::string(to_string(stage)), key_of(plan_.keys, stage)};
   }
 
-  // By unit.
+  // The state of every unit's file, in the order of the units.
   std::vector<UnitState> states(Stage stage) const {
     const stages::StageView folder = view(stage);
     std::vector<UnitState> found;

@@ -1,4 +1,4 @@
-// What a build would make and what it would use again, without making anything.
+// Predicts what a build would make and what it would use again. It writes nothing.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@
 
 namespace q3d::pipeline::build {
 
-// Of one stage that has a folder.
+// The forecast for one stage that has a folder.
 struct StageForecast {
   stages::Stage stage = stages::Stage::predict;
   std::string key;               // 64 hex digits

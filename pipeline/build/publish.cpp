@@ -88,7 +88,7 @@ std::optional<std::string> digest_if_present(const fs::path& file) {
   }
 }
 
-// What dataset.json says; nothing, and a warning, if it is not as it was written.
+// Reads dataset.json. Returns nothing, and warns, if the file is not as it was written.
 std::optional<dataset::DatasetManifest> read_undamaged(const fs::path& folder) {
   try {
     return dataset::read_dataset_manifest(folder);

@@ -32,8 +32,8 @@ class UnitBuilder {
   // undone. Throws std::runtime_error, manifests::IoError, Interrupted.
   void run();
 
-  // Of every candidate, in ingest order; in other ranks than 0, of those that they made. They are final only
-  // if `until` is the last stage.
+  // The judgements of all candidates, in ingest order; a rank other than 0 has those that it made. They are
+  // final only if `until` is the last stage.
   const std::vector<manifests::Judgement>& judgements() const { return judgements_; }
   stages::StageStore& shards() { return shards_; }
   std::int64_t crops_encoded() const { return crops_encoded_; }  // by this process

@@ -14,7 +14,7 @@
 
 namespace q3d::pipeline::build {
 
-// Which results a run makes, of those that decide verdicts.
+// The results that a run makes, among those that decide verdicts.
 struct VerdictSteps {
   bool judges = true;  // false in a run that only predicts
   bool refines = true;
@@ -40,7 +40,7 @@ class UnitProgress : public unit::StepObserver {
   void finish(const unit::UnitWork& work, bool from_earlier_run);
 
   using Counts = std::array<std::int64_t, 4>;  // by manifests::Verdict
-  // What other processes have finished by now. May be called on any thread.
+  // Takes over the counts of what other processes have finished by now. May be called on any thread.
   void others(const Counts& counts);
   static Counts counts_of(const unit::UnitWork& work);
 

@@ -43,8 +43,8 @@ std::int64_t tick_of(std::int64_t time_ns) {
   return time_ns % manifests::kNsPerSecond == 0 ? kCoarseTickNs : kTickNs;
 }
 
-// What the user asks for, and where. The program's own stamp stands for its code. In a copy of an output
-// folder, the record would speak of the files of the other one.
+// A digest of what the user asks for, and of the output folder's place: in a copy of the folder, the record
+// would speak of the files of the other one. The program's own stamp stands for its code.
 std::string request_digest(const fs::path& out, const config::BuildConfig& config,
                            const config::JudgingRules& rules, const std::string& device_key) {
   json datasets = json::array();

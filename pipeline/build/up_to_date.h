@@ -21,8 +21,8 @@ namespace q3d::pipeline::build {
 
 class UpToDateRecord {
  public:
-  // Of the request that this config is, on this device. What is found later belongs to this moment or an
-  // earlier one.
+  // The record of the request that this config makes on this device. Later calls say what was true at this
+  // moment or before it.
   UpToDateRecord(const std::filesystem::path& out, const config::BuildConfig& config,
                  const config::JudgingRules& rules, const std::string& device_key);
 
@@ -32,7 +32,7 @@ class UpToDateRecord {
     std::int64_t candidates = 0;
     std::int64_t units = 0;
   };
-  // What the request ends with if nothing has changed. A record that is damaged counts as none. Throws
+  // Returns what the request ends with if nothing has changed. A damaged record counts as none. Throws
   // manifests::IoError.
   std::optional<Unchanged> unchanged() const;
 

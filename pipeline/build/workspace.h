@@ -26,7 +26,7 @@ namespace q3d::pipeline::build {
 // Returns how many threads RunOptions::threads asks for: 0 means one for each core.
 std::size_t flow_threads(int wanted);
 
-// What every run says of its candidates: their number, unless it is quiet, and the notes.
+// Every run logs the number of its candidates, unless it is quiet, and the notes.
 void log_candidates(std::int64_t candidates, std::int64_t units, bool quiet);
 void log_notes(const std::vector<candidates::IngestNote>& notes, bool quiet);
 
@@ -43,7 +43,7 @@ class Workspace {
   // std::runtime_error, Interrupted.
   Workspace(const config::BuildConfig& config, const run::RunOptions& options, Use use = Use::work);
 
-  // Of Use::work and Use::join.
+  // The next ones may be called after Use::work and Use::join.
   const std::filesystem::path& out() const { return options_.out; }
   const candidates::Ingest& ingest() const { return ingest_; }
   const stages::AssetDigests& assets() const { return assets_; }

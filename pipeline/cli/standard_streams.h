@@ -21,7 +21,7 @@ void finish_stdout();
 
 // Whether something that was printed to stdout has not arrived.
 bool stdout_failed();
-// What to tell of it; `reason` is the system's.
+// The message for a stdout that cannot be written; `reason` is the system's.
 std::string unwritten_stdout(const std::string& reason);
 
 }  // namespace q3d::pipeline::cli

@@ -23,8 +23,8 @@ using nlohmann::json;
 constexpr const char* kFormat = "quadruped3d-listed-export";
 // What decides an export's bytes. Its manifest has these members, whichever program wrote it.
 constexpr std::array<const char*, 5> kKeyParts{"export", "code", "key", "content_id", "pictures_anyway"};
-// Where an export that is not finished says what it is: those of this program, and those of the Python
-// package.
+// An unfinished export describes itself in one of these files: the first is this program's, the second the
+// Python package's.
 constexpr std::array<const char*, 2> kUnfinished{".parts/about.json", "export.journal"};
 
 fs::path list_folder(const fs::path& out) {

@@ -58,7 +58,7 @@ void check_files(const fs::path& out, const ordered_json& list, const fs::path& 
   }
 }
 
-// What a run that was killed left, the pictures' folders included.
+// Removes the temporary files that a killed run left, in the pictures' folders too.
 void remove_all_temporaries(const fs::path& out) {
   std::vector<fs::path> folders{out};
   for (const auto& entry : fs::recursive_directory_iterator(out)) {

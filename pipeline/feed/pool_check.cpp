@@ -28,7 +28,7 @@ namespace fs = std::filesystem;
 constexpr double kSmallestSidePx = 1e-3;
 constexpr double kLargestSidePx = 1e7;
 
-// What the dataset.json files say of the shards, each read once.
+// The digests of shards that the dataset.json files state. Each file is read once.
 class Listings {
  public:
   // Nothing if there is no dataset.

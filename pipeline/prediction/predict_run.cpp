@@ -143,7 +143,7 @@ class Predictor {
     return samples;
   }
 
-  // How many of a unit's animals adapt() counts.
+  // The number of a unit's animals that were adapted.
   static std::int64_t adapted(const unit::UnitWork& work) {
     return static_cast<std::int64_t>(work.refined ? work.refined->size() : 0);
   }

@@ -42,7 +42,7 @@ BuildPlan plan_of(const config::BuildConfig& config, const config::JudgingRules&
 // The folder of the plans. The other folders beside it are those of stages.
 std::filesystem::path plans_folder(const std::filesystem::path& out);
 
-// Where the plan of a version lies.
+// The path of a version's plan.
 std::filesystem::path plan_file(const std::filesystem::path& out, const std::string& version);
 
 // Writes the plan, unless its file holds it already. Throws manifests::IoError.

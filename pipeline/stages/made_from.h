@@ -1,4 +1,4 @@
-// What the stages of a build are made from: what their keys are digests of.
+// The inputs of each stage of a build, as the texts whose digests are the stages' keys.
 #pragma once
 
 #include <map>
@@ -8,7 +8,7 @@
 
 namespace q3d::pipeline::stages {
 
-// By the stages' names, the canonical JSON texts whose SHA-256 are the keys that stage_keys() gives.
+// Returns, by the stages' names, the canonical JSON texts whose SHA-256 are the keys that stage_keys() gives.
 // `measure` is absent where it has no key.
 std::map<std::string, std::string> made_from(const config::BuildConfig& config,
                                              const config::JudgingRules& rules,

@@ -10,7 +10,7 @@
 
 namespace q3d::pipeline::stages {
 
-// What a stage of the second build is made from, where it differs from the first's: "tau_low: 0.02 -> 0.03".
+// Lists where the inputs of a stage of the second build differ from the first's: "tau_low: 0.02 -> 0.03".
 // A stage before it whose key differs is named as such ("the stage predict before it"), except `fidelity`,
 // whose own differences are listed, since it leaves no file. Empty if the keys are equal. Throws
 // std::out_of_range if a plan does not have the stage.

@@ -53,7 +53,7 @@ void StageStore::take_over(const std::vector<std::filesystem::path>& files) {
 }
 
 void StageStore::take_over_ranks() {
-  // By their names, because a network file system may not list new files yet.
+  // The journals are found by their names, because a network file system may not list new files yet.
   std::vector<std::filesystem::path> files;
   for (int rank = 1; rank < rank_.ranks; ++rank) {
     std::filesystem::path file = rank_journal(folder_, rank_.run, rank);

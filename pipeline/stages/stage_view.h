@@ -17,20 +17,20 @@ enum class UnitState : std::uint8_t {
   damaged,      // its file is gone, or is not the one that the journal names
 };
 
-// How a unit's file is compared with the journal.
+// Whether a unit's file is compared with the journal by its size or byte for byte.
 enum class Comparison : std::uint8_t { sizes, bytes };
 
 class StageView {
  public:
-  // Of <out>/stages/<stage>-<key>/, which need not exist. Throws manifests::IoError.
+  // A view of <out>/stages/<stage>-<key>/, which need not exist. Throws manifests::IoError.
   StageView(const std::filesystem::path& out, const std::string& stage, const std::string& key);
 
   const std::filesystem::path& folder() const { return folder_; }
   std::filesystem::path manifest() const { return folder_ / "manifest.json"; }
   bool exists() const;
 
-  // Without a digest, any input will do. With Comparison::bytes the file is read whole; throws
-  // manifests::IoError when it is there and cannot be read.
+  // Without a digest, the unit may have been made from any input. With Comparison::bytes the file is read
+  // whole; throws manifests::IoError when it is there and cannot be read.
   UnitState state(std::int64_t unit, const std::optional<std::string>& digest, Comparison comparison) const;
 
   const manifests::Journal& journal() const { return journal_; }

@@ -1,4 +1,4 @@
-// What lies in an output folder: its builds, finished or not, and how far their stages have come.
+// Reads an output folder: its builds, finished or not, and how far their stages have come.
 #pragma once
 
 #include <cstdint>
@@ -12,8 +12,8 @@
 
 namespace q3d::pipeline::status {
 
-// Of one build. Units are told apart by their input, so a unit that was made from other pictures or labels
-// counts as missing. Files are compared by their sizes; `verify` and the next build read them whole.
+// A stage of one build. Units are told apart by their input, so a unit that was made from other pictures or
+// labels counts as missing. Files are compared by their sizes; `verify` and the next build read them whole.
 struct StageStatus {
   stages::Stage stage = stages::Stage::ingest;
   std::string key;                    // 64 hex digits; empty where dataset.json does not state it

@@ -43,7 +43,7 @@ std::string units_are(const std::vector<std::int64_t>& units) {
   return units.size() == 1 ? fmt::format("unit {} is", text) : fmt::format("units {} are", text);
 }
 
-// What is to be said of a stage beside its numbers.
+// A remark on a stage, beside its numbers.
 std::string remark(const StageStatus& stage) {
   if (stage.stage == Stage::fidelity) return "has no file; every build computes it again";
   if (stage.stage == Stage::ingest) {

@@ -25,7 +25,7 @@ class TrainingPools {
 
   // One of the pools, without what is left out.
   feed::ShardPool open(const std::string& name) const;
-  // What decides which samples there are: the shards' digests, by pool, and what of them is left out.
+  // Everything that decides which samples there are: the shards' digests, by pool, and what is left out.
   const nlohmann::json& identity() const { return identity_; }
   const std::vector<std::string>& left_out() const { return left_out_; }  // one a line, with the reason
 

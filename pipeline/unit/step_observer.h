@@ -1,5 +1,5 @@
-// Who is told how a unit's steps go on, after each batch of the network, so that progress moves within a
-// unit.
+// An observer is told after each batch of the network how far a unit's step has come, so that progress moves
+// within a unit.
 #pragma once
 
 #include <algorithm>
@@ -18,18 +18,19 @@ class StepObserver {
   StepObserver& operator=(const StepObserver&) = delete;
   virtual ~StepObserver() = default;
 
-  // What predict found of the candidate at `position`; called once for each candidate of the unit.
+  // Called once for each candidate of the unit, with what predict found for the candidate at `position`.
   virtual void predicted(const UnitWork& /*work*/, std::size_t /*position*/,
                          const PredictedSample& /*sample*/) {}
-  // What refine found; called once for each candidate that is adapted. work.predicted is there.
+  // Called once for each candidate that is adapted, with what refine found. work.predicted is there.
   virtual void refined(const UnitWork& /*work*/, const RefinedSample& /*sample*/) {}
-  // After a batch: `done` of the `total` candidates that the step gives to the network are through.
+  // Called after a batch: `done` of the `total` candidates that the step gives to the network are through.
   virtual void batch_done(const UnitWork& /*work*/, std::string_view /*step*/, std::size_t /*done*/,
                           std::size_t /*total*/) {}
 };
 
-// How a step gives a unit's candidates to the network. `batch` must be the batch size that the network itself
-// has for the step: then its results have the same bits as those of one call with all candidates.
+// The way in which a step gives a unit's candidates to the network. `batch` must be the batch size that the
+// network itself has for the step: then its results have the same bits as those of one call with all
+// candidates.
 struct Watch {
   StepObserver* observer = nullptr;  // null: all candidates go to the network in one call
   std::size_t batch = 0;

@@ -80,8 +80,8 @@ struct UnitWork {
   // L_proj of the bodies in `predicted` by position, in crop units. It is NaN where the candidate failed,
   // where no keypoint is visible, and where the body has no projection.
   std::vector<double> errors;
-  // By position: the features of the candidates that the rule adapts, as predict left them; freed by refine.
-  // Empty in a resumed run, which encodes these pictures again.
+  // The features, by position, of the candidates that the rule adapts. Predict leaves them, refine frees
+  // them. Empty in a resumed run, which encodes these pictures again.
   std::vector<device::KeptFeatures> features;
   std::vector<DecodedSample> decoded;            // by position; freed once the stored crops are encoded
   std::vector<manifests::Judgement> judgements;  // by position
