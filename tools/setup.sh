@@ -231,13 +231,18 @@ pip_advice() {
       echo "A file is not the one that $1 pins; a mirror or proxy may have replaced it."
       echo "Do not use it. \`pip config list\` shows which index pip asks."
       ;;
-    *"No matching distribution"*)
-      echo "The package index, or the folder that stands for it, has no such wheel for $(uname -m) and this Python."
-      echo "$1 names the wheels that are needed."
+    # pip ends with "No matching distribution" after every failure to ask the index, so the causes come first.
+    *"CERTIFICATE_VERIFY_FAILED"*)
+      echo "pip does not trust the certificate with which the package index answers. Behind a proxy that signs its own,"
+      echo "name the proxy's certificate: PIP_CERT=/etc/ssl/certs/ca-certificates.crt make setup"
       ;;
     *"Failed to establish"* | *"timed out"* | *"Name or service"* | *"resolution"*)
       echo "The package index cannot be reached. docs/install.md (\"Offline\") says how to install from a folder."
       echo "$again"
+      ;;
+    *"No matching distribution"*)
+      echo "The package index, or the folder that stands for it, has no such wheel for $(uname -m) and this Python."
+      echo "$1 names the wheels that are needed."
       ;;
     *) printf '%s\n' "The whole output is in $log. Remove the cause." "$again" ;;
   esac

@@ -116,17 +116,20 @@ class VenvTest(SetupCase):
         self.assertIn(".venv lacks files of these packages: numpy, torch\n", messages)
 
     def test_pip_that_fails(self):
+        none_found = "ERROR: No matching distribution found for torch==2.0"
         for output, advice in (
             ("ERROR: Could not install packages due to an OSError: [Errno 28] No space left on device", "disk is full"),
             ("ERROR: THESE PACKAGES DO NOT MATCH THE HASHES FROM THE REQUIREMENTS FILE.", "Do not use it"),
-            ("ERROR: No matching distribution found for torch==2.0", "has no such wheel for"),
+            (none_found, "has no such wheel for"),
             ("Failed to establish a new connection: Name or service not known", 'docs/install.md ("Offline")'),
+            (f"Failed to establish a new connection: timed out\n{none_found}", 'docs/install.md ("Offline")'),
+            (f"SSLError(SSLCertVerificationError(1, '[SSL: CERTIFICATE_VERIFY_FAILED]'\n{none_found}", "PIP_CERT="),
             ("something else", "The whole output is in build/setup.log"),
         ):
             with self.subTest(output=output):
                 code, messages = self.run_setup([self.packages, Rule("^python -m pip install", out=output, code=1)])
                 self.assertEqual((code, self.stamps()), (1, []))
-                for mention in (f"| {output}", "pip could not install", advice):
+                for mention in (f"| {output.splitlines()[-1]}", "pip could not install", advice):
                     self.assertIn(mention, messages)
         self.assertEqual(self.run_setup([self.packages])[0], 0)  # the next run goes on
         self.assertEqual(self.called("-m venv"), [])
