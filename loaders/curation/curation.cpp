@@ -90,6 +90,7 @@ void keep_clips_whole(std::span<const CuratedPicture> pictures, std::vector<Cura
 void order_for_drawing(std::span<const CuratedPicture> pictures, std::uint64_t seed,
                        std::vector<std::size_t>& members) {
   std::vector<std::pair<std::string, std::size_t>> shuffled;  // by a hash that only seed and name decide
+  shuffled.reserve(members.size());
   for (const std::size_t i : members) {
     shuffled.emplace_back(manifests::sha256(fmt::format("{} {}", seed, pictures[i].image_ref)), i);
   }
@@ -124,6 +125,7 @@ std::vector<Curated> curate(std::span<const CuratedPicture> pictures, const Cura
       if (may_be_drawn) members[choices[i].species].push_back(i);
     }
     std::vector<std::int64_t> available;
+    available.reserve(members.size());
     for (const auto& [species, list] : members) {
       available.push_back(static_cast<std::int64_t>(list.size()));
     }

@@ -22,8 +22,8 @@ using manifests::SampleRecord;
 
 using Parser = Dataset (*)(const DatasetOptions&);
 struct Format {
-  const char* name;
-  Parser parser;
+  const char* name = nullptr;
+  Parser parser = nullptr;
   bool takes_topology = false;
 };
 // SLEAP's and Lightning Pose's files are tables of the same kind as DeepLabCut's, so all three share a
@@ -53,6 +53,7 @@ void require_id_part(const std::string& part, const char* option) {
 
 std::vector<std::string> dataset_formats() {
   std::vector<std::string> names;
+  names.reserve(kFormats.size());
   for (const Format& format : kFormats) names.emplace_back(format.name);
   return names;
 }
@@ -82,8 +83,8 @@ Loading::Loading(const DatasetOptions& dataset_options, const std::filesystem::p
               .default_images = default_images,
               .annotations = dataset_options.annotations.parent_path()}) {}
 
-void set_found_picture(Loading& loading, RecordReader& reader, const PictureName& name, FoundPicture found,
-                       const std::string& annotation, SampleRecord& sample) {
+void set_found_picture(Loading& loading, RecordReader& reader, const PictureName& name,
+                       const FoundPicture& found, const std::string& annotation, SampleRecord& sample) {
   sample.dataset = loading.options.name;
   sample.split = loading.options.split;
   sample.image_ref = bounded_text(name.name);
@@ -103,12 +104,12 @@ void set_picture(Loading& loading, RecordReader& reader, const std::vector<Pictu
   for (std::size_t i = 0; i < names.size() && !reader.failed(); ++i) {
     FoundPicture found = loading.finder.find(names[i].name);
     if (found.failure == Reason::none) {
-      set_found_picture(loading, reader, names.front(), std::move(found), annotation, sample);
+      set_found_picture(loading, reader, names.front(), found, annotation, sample);
       return;
     }
     if (i == 0) first = std::move(found);
   }
-  set_found_picture(loading, reader, names.front(), std::move(first), annotation, sample);
+  set_found_picture(loading, reader, names.front(), first, annotation, sample);
 }
 
 void note_placeholders(Loading& loading, std::span<const manifests::Keypoint> keypoints,

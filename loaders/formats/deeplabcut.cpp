@@ -242,6 +242,7 @@ class DeepLabCutLoader {
                        std::vector<PicturePlace>& pictures) {
     if (places.empty()) return;
     std::vector<std::string> rows;
+    rows.reserve(places.size());
     for (const std::size_t place : places) rows.push_back(table.rows[place]);
     const fs::path folder = loading_.options.root / loading_.options.images / subfolder;
     const NumberedPictures numbered(folder);

@@ -45,8 +45,9 @@ struct PictureName {
 void set_picture(Loading& loading, RecordReader& reader, const std::vector<PictureName>& names,
                  const std::string& annotation, manifests::SampleRecord& sample);
 // Sets the same from a picture that was looked for already.
-void set_found_picture(Loading& loading, RecordReader& reader, const PictureName& name, FoundPicture found,
-                       const std::string& annotation, manifests::SampleRecord& sample);
+void set_found_picture(Loading& loading, RecordReader& reader, const PictureName& name,
+                       const FoundPicture& found, const std::string& annotation,
+                       manifests::SampleRecord& sample);
 
 // Notes the keypoints that are labelled but lie where tools put points that nobody set (is_placeholder).
 void note_placeholders(Loading& loading, std::span<const manifests::Keypoint> keypoints,

@@ -40,7 +40,8 @@ LabelSurvey survey_coco(const json& document, const fs::path& file) {
     }
     if (list_in(category, "keypoints").empty()) continue;
     if (++lists > 1 && survey.names.size() != before) {
-      survey.notes.push_back("the categories list different keypoints; the names of all of them are taken");
+      survey.notes.emplace_back(
+          "the categories list different keypoints; the names of all of them are taken");
     }
   }
   if (survey.names.empty()) {
@@ -63,7 +64,7 @@ void survey_labelme(const json& document, LabelSurvey& survey) {
 
 LabelSurvey survey_labelme_files(const std::vector<fs::path>& files) {
   LabelSurvey survey{files.front(), "LabelMe", "", {}, {}};
-  survey.notes.push_back(
+  survey.notes.emplace_back(
       "LabelMe's files do not load as they are: convert them to COCO, with the same names, and use the "
       "format \"coco\"");
   for (const fs::path& file : files) survey_labelme(manifests::read_json_file(file), survey);
