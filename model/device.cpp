@@ -151,18 +151,35 @@ std::string arithmetic_of(const DeviceChoice& choice) {
 
 namespace {
 
-// glibc gives large blocks back at once, and the system clears them anew for the next batch.
-void keep_freed_memory() {
+// glibc gives blocks of this size and above back to the system as soon as they are freed.
+void set_returned_block_bytes([[maybe_unused]] int bytes) {
 #ifdef __GLIBC__
-  constexpr int kLargestBlockBytes = 32 << 20;  // as much as glibc allows
+  mallopt(M_MMAP_THRESHOLD, bytes);
+#endif
+}
+
+constexpr int kLargestKeptBytes = 32 << 20;  // as much as glibc allows
+constexpr int kLargestKeptWhileLoadingBytes = 64 << 10;
+
+// Otherwise the system would clear the pages of each batch's large blocks anew.
+void keep_freed_memory() {
+  set_returned_block_bytes(kLargestKeptBytes);
+#ifdef __GLIBC__
   constexpr int kMarginBytes = 64 << 20;
-  mallopt(M_MMAP_THRESHOLD, kLargestBlockBytes);
   mallopt(M_TRIM_THRESHOLD, std::numeric_limits<int>::max());
   mallopt(M_TOP_PAD, kMarginBytes);
 #endif
 }
 
 }  // namespace
+
+ReturnFreedMemory::ReturnFreedMemory() {
+  set_returned_block_bytes(kLargestKeptWhileLoadingBytes);
+}
+
+ReturnFreedMemory::~ReturnFreedMemory() {
+  set_returned_block_bytes(kLargestKeptBytes);
+}
 
 void configure_compute(int threads) {
   if (threads < 1) {

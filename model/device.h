@@ -29,4 +29,15 @@ std::string arithmetic_of(const DeviceChoice& choice);
 // instead of going back to the system between two batches.
 void configure_compute(int threads);
 
+// While one lives, memory that is freed goes back to the system, which configure_compute otherwise prevents.
+// Weights that are packed matrix by matrix leave gaps into which no packed matrix fits; kept, they would
+// double the memory.
+class ReturnFreedMemory {
+ public:
+  ReturnFreedMemory();
+  ~ReturnFreedMemory();
+  ReturnFreedMemory(const ReturnFreedMemory&) = delete;
+  ReturnFreedMemory& operator=(const ReturnFreedMemory&) = delete;
+};
+
 }  // namespace q3d::model

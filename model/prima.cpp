@@ -7,6 +7,7 @@
 
 #include "model/assemble.h"
 #include "model/checkpoint.h"
+#include "model/device.h"
 #include "model/net.h"
 #include "smal/camera.h"
 #include "smal/tensors/asset.h"
@@ -56,6 +57,7 @@ Prima Prima::load(const std::filesystem::path& checkpoint, const std::filesystem
     throw std::invalid_argument(
         fmt::format("network dtype {} is not float32, bfloat16 or float64", torch::toString(dtype)));
   }
+  const ReturnFreedMemory while_loading;
   const smal::tensors::SmalAsset asset = smal::tensors::load_asset(smal_asset);
   const smal::tensors::SafeTensors file = smal::tensors::SafeTensors::open(checkpoint);
   auto net = load_net(file, checkpoint_config(file), asset, {device, dtype});
