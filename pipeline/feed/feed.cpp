@@ -108,21 +108,18 @@ void fill_body(const TrainingSample& sample, const loaders::pictures::Augmentati
   batch.family[at] = static_cast<std::int64_t>(sample.family);
 }
 
-FeedBatch empty_batch(std::int64_t size, std::int64_t first_draw) {
-  const auto count = static_cast<std::size_t>(size);
-  FeedBatch batch;
-  batch.size = size;
-  batch.first_draw = first_draw;
-  batch.images = std::make_unique_for_overwrite<float[]>(count * kImageNumbers);
-  batch.keypoints_2d.resize(count * kKeypoints * 3);
-  batch.keypoints_3d.resize(count * kKeypoints * 4);
-  batch.rotations.resize(count * kRotationNumbers);
-  batch.betas.resize(count * manifests::kNumBetas);
-  batch.has_pose.resize(count);
-  batch.has_betas.resize(count);
-  batch.family.resize(count);
-  batch.species.resize(count);
-  return batch;
+const FeedOptions& checked(const FeedOptions& options) {
+  if (options.batch < 1) throw std::invalid_argument("a batch must hold at least one sample");
+  if (options.ranks < 1 || options.rank < 0 || options.rank >= options.ranks) {
+    throw std::invalid_argument(fmt::format("rank {} of {} ranks", options.rank, options.ranks));
+  }
+  if (options.batch % options.ranks != 0) {
+    throw std::invalid_argument(fmt::format(
+        "a batch of {} samples cannot be shared equally by {} ranks; choose \"batch\" as a multiple of their "
+        "number",
+        options.batch, options.ranks));
+  }
+  return options;
 }
 
 int arena_threads(int wanted) {
@@ -137,22 +134,29 @@ Feed::Feed(std::vector<ShardPool> pools, const std::vector<double>& weights, con
     : pools_(std::move(pools)),
       species_(all_species(pools_)),
       draws_(shares(pools_, weights), seed),
-      options_(options),
-      arena_(std::make_unique<tbb::task_arena>(arena_threads(options.threads))) {
-  if (options.batch < 1) throw std::invalid_argument("a batch must hold at least one sample");
-  if (options.ranks < 1 || options.rank < 0 || options.rank >= options.ranks) {
-    throw std::invalid_argument(fmt::format("rank {} of {} ranks", options.rank, options.ranks));
-  }
-  if (options.batch % options.ranks != 0) {
-    throw std::invalid_argument(fmt::format(
-        "a batch of {} samples cannot be shared equally by {} ranks; choose \"batch\" as a multiple of their "
-        "number",
-        options.batch, options.ranks));
-  }
+      options_(checked(options)),
+      images_(static_cast<std::size_t>(options.batch / options.ranks) * kImageNumbers),
+      arena_(std::make_unique<tbb::task_arena>(arena_threads(options.threads))) {}
+
+FeedBatch Feed::empty_batch(std::int64_t first_draw) const {
+  FeedBatch batch;
+  batch.size = options_.batch / options_.ranks;
+  batch.first_draw = first_draw;
+  batch.images = images_.take();
+  const auto count = static_cast<std::size_t>(batch.size);
+  batch.keypoints_2d.resize(count * kKeypoints * 3);
+  batch.keypoints_3d.resize(count * kKeypoints * 4);
+  batch.rotations.resize(count * kRotationNumbers);
+  batch.betas.resize(count * manifests::kNumBetas);
+  batch.has_pose.resize(count);
+  batch.has_betas.resize(count);
+  batch.family.resize(count);
+  batch.species.resize(count);
+  return batch;
 }
 
 FeedBatch Feed::batch(std::int64_t first_draw) const {
-  FeedBatch batch = empty_batch(options_.batch / options_.ranks, first_draw);
+  FeedBatch batch = empty_batch(first_draw);
   arena_->execute(
       [&] { tbb::parallel_for(std::int64_t{0}, batch.size, [&](std::int64_t slot) { fill(batch, slot); }); });
   return batch;

@@ -12,6 +12,7 @@
 
 #include "loaders/pictures/augment.h"
 #include "pipeline/feed/draw_sequence.h"
+#include "pipeline/feed/image_buffers.h"
 #include "pipeline/feed/shard_pool.h"
 
 namespace q3d::pipeline::feed {
@@ -36,7 +37,7 @@ struct FeedOptions {
 struct FeedBatch {
   std::int64_t size = 0;
   std::int64_t first_draw = 0;             // of the joint batch
-  std::unique_ptr<float[]> images;         // (B, 3, 256, 256) normalised
+  ImageBuffers::Buffer images;             // (B, 3, 256, 256) normalised
   std::vector<float> keypoints_2d;         // (B, 26, 3): x, y in crop units and a weight
   std::vector<float> keypoints_3d;         // (B, 26, 4): SMAL units, and 1 or 0
   std::vector<float> rotations;            // (B, 35, 3, 3); identities where there are none
@@ -63,12 +64,14 @@ class Feed {
   std::int64_t batch_size() const { return options_.batch; }  // of all ranks together
 
  private:
+  FeedBatch empty_batch(std::int64_t first_draw) const;
   void fill(FeedBatch& batch, std::int64_t slot) const;
 
   std::vector<ShardPool> pools_;
   std::vector<std::string> species_;
   DrawSequence draws_;
   FeedOptions options_;
+  ImageBuffers images_;
   std::unique_ptr<tbb::task_arena> arena_;
 };
 
