@@ -1,17 +1,19 @@
 #!/usr/bin/env python3
-"""Samples a second of python/quadruped3d's Dataset beside WebDataset and MosaicML's MDS, in one run and one process.
+"""Samples a CPU second of python/quadruped3d's Dataset beside WebDataset, MosaicML's MDS and the C++ feed, in one run.
 
     pip install webdataset mosaicml-streaming        # into an environment with torch and ./python[pictures]
-    python bench/readers.py out/latest [--seconds 10] [--rounds 3]
+    python bench/readers.py out/latest [--seconds 10] [--rounds 3] [--feed build/release/bench/feed_bench]
 
 It packs the samples of a dataset into WebDataset's tar files and into MDS in a temporary folder: the same encoded crops,
 and the labels of each sample as one array. Every reader then gives the same thing, a normalised picture of 256 px and
 the labels, in an order of its own kind: Dataset by random numbers, MDS by its shuffled epochs, WebDataset from the
 shuffle buffer that its documentation recommends (1,000 samples). Before it measures, it checks that all of them give
-equal pictures and labels.
+equal pictures and labels. The C++ feed gives the same too, and augments every sample; it runs with one thread in a
+process of its own.
 
 The readers take turns, and the table has the median of the rounds: compare the rows of one run with each other, and
-not with those of another run. "bytes" measures how fast samples come off the disk, without decoding a picture.
+not with those of another run. "bytes" measures how fast samples come off the disk, without decoding a picture. CPU seconds are those of the whole
+process, since other work on the machine changes the wall time.
 """
 
 from __future__ import annotations
@@ -19,7 +21,9 @@ from __future__ import annotations
 import argparse
 import io
 import pathlib
+import re
 import statistics
+import subprocess
 import sys
 import tempfile
 import time
@@ -130,20 +134,28 @@ def check_that_they_agree(dataset: quadruped3d.Dataset, readers: dict[str, Calla
 
 
 def rate(source: Generator[Sample, None, None], seconds: float) -> float:
-    """Samples a second, after the first, which opens files. Closes the source."""
+    """Samples a CPU second, after the first, which opens files. Closes the source."""
     next(source)
-    start, count = time.perf_counter(), 0
-    while (elapsed := time.perf_counter() - start) < seconds:
+    start, count = time.process_time(), 0
+    while (elapsed := time.process_time() - start) < seconds:
         next(source)
         count += 1
     source.close()
     return count / elapsed
 
 
+def rate_of_feed(program: str, source: pathlib.Path, seconds: float) -> float:
+    """Samples a CPU second of one thread of the C++ feed."""
+    shards = [source] if source.is_file() else sorted(source.rglob("shards/*.h5"))
+    printed = subprocess.run([program, str(seconds), *map(str, shards)], check=True, capture_output=True, text=True).stdout
+    return float(re.search(r"1 threads: .*, (\d+) a CPU second", printed)[1])
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("source", help="a dataset's folder, an output folder or a shard")
     parser.add_argument("--seconds", type=float, default=10, help="of each measurement")
+    parser.add_argument("--feed", help="feed_bench, to measure the C++ feed too")
     parser.add_argument("--rounds", type=int, default=3, help="measurements of each reader")
     options = parser.parse_args()
     dataset = quadruped3d.Dataset(options.source)
@@ -163,11 +175,14 @@ def main() -> int:
                 for name, reader in readers.items():
                     found = rate(reader(decode=decode, seed=round_number), options.seconds)
                     rates.setdefault((name, decode), []).append(found)
-    print(f"{len(dataset)} samples; samples a second, the median of {options.rounds} rounds (least to most)")
+            if options.feed:
+                found = rate_of_feed(options.feed, pathlib.Path(options.source), options.seconds)
+                rates.setdefault(("C++ feed, augmented", True), []).append(found)
+    print(f"{len(dataset)} samples; samples a CPU second, the median of {options.rounds} rounds (least to most)")
     print(f"{'':22}{'picture and labels':>28}{'bytes':>28}")
-    for name in readers:
-        cells = [f"{statistics.median(found):.0f} ({min(found):.0f} to {max(found):.0f})"
-                 for found in (rates[name, True], rates[name, False])]
+    for name in dict.fromkeys(name for name, _ in rates):
+        cells = [f"{statistics.median(found):.0f} ({min(found):.0f} to {max(found):.0f})" if found else ""
+                 for found in (rates[name, True], rates.get((name, False)))]
         print(f"{name:22}{cells[0]:>28}{cells[1]:>28}")
     return 0
 
