@@ -1,53 +1,11 @@
 """One build on several ranks, as torchrun or srun starts it: the bytes of one process, also when ranks die."""
 
-import datetime
-import json
 import signal
-import socket
 import subprocess
 import sys
 
-from e2e import LIMIT_S, Fault, Scene, SceneCase, command, digests, environment, prima_dataset, run, wait_until
-
-
-def free_port():
-    with socket.socket() as server:
-        server.bind(("127.0.0.1", 0))
-        return server.getsockname()[1]
-
-
-class Rank:
-    """One rank as a process; a launcher would set these variables."""
-
-    def __init__(self, words, rank, ranks, store, log, fault):
-        self.log = log
-        self.out = log.with_suffix(".out")
-        env = {**environment(fault), "RANK": str(rank), "WORLD_SIZE": str(ranks), "LOCAL_RANK": str(rank),
-               "LOCAL_WORLD_SIZE": str(ranks), "MASTER_ADDR": "127.0.0.1", **store}
-        with open(log, "w") as errors, open(self.out, "w") as output:
-            self.process = subprocess.Popen(command(words), env=env, stderr=errors, stdout=output)
-
-    def wait(self):
-        return self.process.wait(LIMIT_S)
-
-    def wait_for_fault(self):
-        wait_until(lambda: "faults: " in self.stderr() or self.process.poll() is not None, "the fault")
-        if self.process.poll() is not None:
-            raise AssertionError(f"ended with {self.process.returncode}:\n{self.stderr()}")
-
-    def send(self, number):
-        self.process.send_signal(number)
-
-    def summary(self):
-        return json.loads(self.out.read_text())
-
-    def stderr(self):
-        return self.log.read_text()
-
-    def end(self):
-        self.process.kill()
-        self.process.wait()
-
+from e2e import (LIMIT_S, Fault, Rank, Scene, SceneCase, command, digests, environment, launcher_store, own_store,
+                 prima_dataset, run, wait_until)
 
 # Rank 0 syncs two files of the stage's folder when it opens it; then it syncs its first shard.
 FIRST_SHARD_OF_RANK_0 = 2
@@ -71,21 +29,13 @@ class SharedBuild(SceneCase):
         self.addCleanup(started.end)
         return started
 
-    def own_store(self):
-        """Rank 0 holds the store, as under srun."""
-        return {"MASTER_PORT": str(free_port())}
-
     def launcher_store(self):
-        """The launcher holds the store, as torchrun does, so that it lives on when rank 0 is stopped or killed."""
-        from torch.distributed import TCPStore  # here, since listing the tests should not load PyTorch
-
-        store = TCPStore("127.0.0.1", 0, is_master=True, wait_for_workers=False,
-                         timeout=datetime.timedelta(seconds=LIMIT_S))
-        self.addCleanup(lambda: store)
-        return {"MASTER_PORT": str(store.port), "TORCHELASTIC_USE_AGENT_STORE": "True"}
+        store, variables = launcher_store()
+        self.addCleanup(lambda: store)  # keeps it
+        return variables
 
     def start_all(self, words, ranks, faults=None):
-        store = self.own_store()
+        store = own_store()
         return [self.start(words, rank, ranks, store, (faults or {}).get(rank)) for rank in range(ranks)]
 
     def wait_all(self, ranks, expect=0):
@@ -183,7 +133,7 @@ class SharedBuild(SceneCase):
         self.assert_equals_one("out")
 
     def test_when_rank_0_is_killed_with_the_store_the_next_start_completes(self):
-        store = self.own_store()
+        store = own_store()
         first = self.start(self.words("out"), 0, 2, store,
                            Fault("shards-", "sync", "hang", skip=FIRST_SHARD_OF_RANK_0))
         first.wait_for_fault()
@@ -197,7 +147,7 @@ class SharedBuild(SceneCase):
         self.assert_equals_one("out")
 
     def test_a_rank_of_another_configuration_is_refused_and_the_others_finish(self):
-        store = self.own_store()
+        store = own_store()
         first = self.start(self.words("out"), 0, 2, store)
         other = self.start(self.words("out", "--set", "tta.learning_rate=2e-3"), 1, 2, store)
         self.assertEqual(other.wait(), 2)

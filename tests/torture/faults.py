@@ -17,13 +17,12 @@ import argparse
 import errno
 import os
 import pathlib
-import re
 import shutil
 import sys
 import tempfile
 
-import torture
-from e2e import Fault, fault_lines, run
+from jobs import Inputs, add_program_options, check_latest, counted_calls, use_program
+from e2e import Fault, fault_lines, run  # jobs has told Python where it is
 
 # An error that the call may meet: a broken disk, a full one, a quota, a disk without links or locks.
 ERRORS = {"open": "EIO", "read": "EIO", "stat": "EIO", "write": "ENOSPC", "sync": "EIO", "rename": "EIO",
@@ -31,35 +30,25 @@ ERRORS = {"open": "EIO", "read": "EIO", "stat": "EIO", "write": "ENOSPC", "sync"
 JOBS = ("labels", "network", "train", "merge", "export", "leakage", "calibrate")
 
 
-def check_left(job, out):
-    wrong = torture.differences(job.expected, torture.result_of(out))
-    if wrong:
-        raise AssertionError(f"other files than without a fault: {', '.join(wrong[:10])}")
-
-
 def trial(job, out, fault):
     """Returns whether the job met the fault and stopped; None if it made no such call. Raises AssertionError."""
     result = run(*job.words(out), expect=None, fault=fault)
     if not fault_lines(result.stderr):
         return None
-    torture.check_latest(out)
+    check_latest(out)
     if result.returncode == 0:
-        check_left(job, out)
+        job.check_equal(out)
     elif not (result.returncode == 1 and os.strerror(getattr(errno, fault.error)) in result.stderr
               or result.returncode == 2 and fault.call == "stat" and not out.exists()):
         raise AssertionError(f"ended with {result.returncode}:\n{result.stderr}")
-    run(*job.words(out))
-    check_left(job, out)
-    left = [str(path) for path in out.rglob("*") if torture._TEMPORARY.search(path.name)]
-    if left:
-        raise AssertionError(f"temporaries are left: {', '.join(left[:10])}")
+    job.check_completes(out)
     return result.returncode != 0
 
 
 def count_calls(job, out, kind, place):
     counted = run(*job.words(out), fault=Fault(place, kind, "count"))
     shutil.rmtree(out)
-    return max(map(int, re.findall(r"faults: counted (\d+) calls", counted.stderr)), default=0)
+    return counted_calls(counted.stderr)
 
 
 def strike_all(job, folder, kind, stride):
@@ -87,21 +76,20 @@ def parsed():
     parser.add_argument("stride", type=int, nargs="?", default=1, help="take every STRIDEth call (default: every one)")
     parser.add_argument("--jobs", default=",".join(JOBS), help="names, separated by commas (default: %(default)s)")
     parser.add_argument("--kinds", default=",".join(ERRORS), help="kinds of calls (default: %(default)s)")
-    torture.add_program_options(parser)
+    add_program_options(parser)
     return parser.parse_args()
 
 
 def main():
     arguments = parsed()
-    if not torture.use_program(arguments):
+    if not use_program(arguments):
         return 2
     folder = pathlib.Path(tempfile.mkdtemp(prefix="q3d_faults_")).resolve()
-    (folder / "shared").mkdir()
-    inputs = torture.Inputs(folder / "shared")
+    inputs = Inputs(folder / "shared")
     all_tried = all_failed = 0
     for name in arguments.jobs.split(","):
-        job = torture.Job(name, getattr(inputs, name)())
-        torture.measure(job, folder / "undisturbed")
+        job = inputs.job(name)
+        job.measure(folder / "undisturbed")
         for kind in arguments.kinds.split(","):
             calls, tried, stopped, failed = strike_all(job, folder, kind, arguments.stride)
             print(f"{name}, {kind} ({ERRORS[kind]}): {calls} calls, {tried} tried, {stopped} stopped with a message, "

@@ -5,6 +5,7 @@ __main__.py, which also tells it where the program is. The parts:
 
     case       Case: tests that share one expensive folder and write only into a folder of their own
     program    run and start the program; make it stop, hang or fail at an exact point; kill and resume it
+    ranks      start the program as ranks that share a build
     scene      Scene: drawn pictures, a tiny network, a config and calibrated thresholds; cases that share one
     pictures   draw pictures and annotations, give bodies to annotations, make networks and the rendered world
     intake     IntakeCase: label files as people have them, over pictures with a dot at each keypoint
@@ -21,4 +22,5 @@ from .pictures import (FOCAL, draw_pictures, give_bodies, make_network, prima_da
                        world_animal3d, world_body, world_superanimal, write_annotations, write_json)
 from .program import (LIMIT_S, Fault, alarm_seconds, command, environment, fault_lines, kill_and_resume, program, run,
                       run_json, started, wait_until)
+from .ranks import Rank, launcher_store, own_store
 from .scene import PICTURES, UNIT, DrawnCase, Scene, SceneCase
