@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "manifests/atomic_file.h"
-#include "manifests/json_parse.h"
+#include "manifests/sealed_json.h"
 #include "pipeline/run/log.h"
 #include "pipeline/stages/made_from.h"
 #include "pipeline/stages/stage.h"
@@ -22,6 +22,7 @@ using nlohmann::json;
 using nlohmann::ordered_json;
 
 constexpr const char* kFormat = "quadruped3d-build-plan";
+constexpr std::size_t kMembers = 7;  // of the document, without its digest
 
 ordered_json stages_json(const BuildPlan& plan) {
   ordered_json stages = ordered_json::object();
@@ -46,7 +47,7 @@ std::string text_of(const BuildPlan& plan) {
                                  {"command", plan.command},
                                  {"stages", stages_json(plan)},
                                  {"units", units}};
-  return document.dump(2) + "\n";
+  return manifests::seal_json(document);
 }
 
 // Throws json::exception when something is missing or of another type.
@@ -69,19 +70,47 @@ BuildPlan plan_from(const json& document) {
   return plan;
 }
 
-std::optional<BuildPlan> read_plan(const fs::path& file) {
-  const json document = manifests::parse_json_or_null<json>(manifests::read_file(file));
-  std::string problem = "it is not readable JSON";
-  if (document.is_object() && document.value("format", json()) == kFormat) {
-    try {
-      return plan_from(document);
-    } catch (const json::exception& error) {
-      problem = error.what();
+// A plan, or what is wrong with its file.
+struct PlanFile {
+  fs::path file;
+  std::optional<BuildPlan> plan;
+  std::string problem;
+};
+
+// A plan of an earlier version has no digest.
+PlanFile parse_plan(const fs::path& file, const manifests::SealedDocument& sealed) {
+  const json document = sealed.document;
+  if (document.value("format", json()) != kFormat) return {file, {}, "it holds no build plan"};
+  if (!sealed.has_digest && document.size() != kMembers) {
+    return {file, {}, fmt::format("got {} members, expected {} and a digest", document.size(), kMembers)};
+  }
+  try {
+    return {file, plan_from(document), {}};
+  } catch (const json::exception& error) {
+    return {file, {}, error.what()};
+  }
+}
+
+PlanFile read_plan(const fs::path& file) {
+  try {
+    return parse_plan(file, manifests::read_sealed_json(file));
+  } catch (const manifests::DamagedDocument& error) {
+    const std::string name = file.string() + ": ";  // with which that error begins
+    return {file, {}, std::string(error.what()).substr(name.size())};
+  }
+}
+
+std::vector<PlanFile> read_plan_files(const fs::path& out) {
+  std::vector<fs::path> files;
+  if (fs::exists(plans_folder(out))) {
+    for (const auto& entry : fs::directory_iterator(plans_folder(out))) {
+      if (entry.path().extension() == ".json") files.push_back(entry.path());
     }
   }
-  run::log_warning(
-      fmt::format("{}: damaged: {}; the next run of its build writes it anew", file.string(), problem));
-  return std::nullopt;
+  std::sort(files.begin(), files.end());
+  std::vector<PlanFile> plans;
+  for (const fs::path& file : files) plans.push_back(read_plan(file));
+  return plans;
 }
 
 }  // namespace
@@ -123,18 +152,24 @@ void write_build_plan(const fs::path& out, const BuildPlan& plan) {
 }
 
 std::vector<BuildPlan> read_build_plans(const fs::path& out) {
-  std::vector<fs::path> files;
-  if (fs::exists(plans_folder(out))) {
-    for (const auto& entry : fs::directory_iterator(plans_folder(out))) {
-      if (entry.path().extension() == ".json") files.push_back(entry.path());
+  std::vector<BuildPlan> plans;
+  for (PlanFile& each : read_plan_files(out)) {
+    if (each.plan) {
+      plans.push_back(std::move(*each.plan));
+    } else {
+      run::log_warning(fmt::format("{}: damaged: {}; the next run of its build writes it anew",
+                                   each.file.string(), each.problem));
     }
   }
-  std::sort(files.begin(), files.end());
-  std::vector<BuildPlan> plans;
-  for (const fs::path& file : files) {
-    if (auto plan = read_plan(file)) plans.push_back(std::move(*plan));
-  }
   return plans;
+}
+
+std::vector<DamagedPlan> find_damaged_plans(const fs::path& out) {
+  std::vector<DamagedPlan> damaged;
+  for (PlanFile& each : read_plan_files(out)) {
+    if (!each.plan) damaged.push_back({std::move(each.file), std::move(each.problem)});
+  }
+  return damaged;
 }
 
 }  // namespace q3d::pipeline::stages

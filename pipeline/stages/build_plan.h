@@ -52,4 +52,12 @@ void write_build_plan(const std::filesystem::path& out, const BuildPlan& plan);
 // and a warning names it. Throws manifests::IoError.
 std::vector<BuildPlan> read_build_plans(const std::filesystem::path& out);
 
+struct DamagedPlan {
+  std::filesystem::path file;
+  std::string problem;  // what was found and what was expected
+};
+
+// The plans' files that read_build_plans would leave out. Throws manifests::IoError.
+std::vector<DamagedPlan> find_damaged_plans(const std::filesystem::path& out);
+
 }  // namespace q3d::pipeline::stages

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <utility>
 
 #include "manifests/digest.h"
 #include "manifests/file_descriptor.h"
@@ -76,6 +77,9 @@ StageCheck check_stages(const fs::path& out) {
   for (const fs::path& folder : stage_folders(out)) {
     check_manifest(folder, check);
     check_units(folder, check);
+  }
+  for (DamagedPlan& plan : find_damaged_plans(out)) {
+    check.problems.push_back({std::move(plan.file), std::move(plan.problem), ""});
   }
   return check;
 }

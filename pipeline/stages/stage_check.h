@@ -11,7 +11,7 @@ namespace q3d::pipeline::stages {
 struct StageProblem {
   std::filesystem::path file;
   std::string text;      // what was found and what was expected
-  std::string expected;  // SHA-256 that a unit's file must have; empty for a journal or a manifest
+  std::string expected;  // SHA-256 that a unit's file must have; empty for a journal, manifest or plan
 };
 
 struct StageCheck {
@@ -19,9 +19,9 @@ struct StageCheck {
   std::vector<StageProblem> problems;
 };
 
-// Reads every unit's file that a journal in <out>/stages names, the journals themselves and the manifests. A
-// file without a journal line is no problem: a killed run left it, and no build uses it. The result is empty
-// if there are no stages. Throws manifests::IoError and Interrupted.
+// Reads every unit's file that a journal in <out>/stages names, the journals themselves, the manifests and
+// the builds' plans. A file without a journal line is no problem: a killed run left it, and no build uses it.
+// The result is empty if there are no stages. Throws manifests::IoError and Interrupted.
 StageCheck check_stages(const std::filesystem::path& out);
 
 }  // namespace q3d::pipeline::stages

@@ -209,7 +209,11 @@ std::map<std::string, std::string> made_from(const config::BuildConfig& config,
 
 std::optional<std::string> key_in_manifest(const std::filesystem::path& file) {
   try {
-    const nlohmann::ordered_json manifest = manifests::read_sealed_json(file).document;
+    const auto [manifest, has_digest] = manifests::read_sealed_json(file);
+    // A manifest of an earlier version has no digest, and nothing but these two. One that has more has lost
+    // it.
+    constexpr std::size_t kMembers = 2;
+    if (!has_digest && manifest.size() != kMembers) return std::nullopt;
     const auto found = manifest.find("key");
     if (found == manifest.end() || !found->is_string()) return std::nullopt;
     std::string key = found->get<std::string>();

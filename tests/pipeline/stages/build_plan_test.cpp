@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include <fstream>
 #include <functional>
 
 #include "manifests/atomic_file.h"
@@ -97,6 +98,35 @@ TEST(BuildPlan, ADamagedFileIsToldAndLeftOut) {
     EXPECT_THAT(told.warnings, ElementsAre(HasSubstr(file.string() + ": damaged"))) << text;
   }
   EXPECT_THAT(read_build_plans(scratch.path() / "nowhere"), IsEmpty());
+}
+
+TEST(BuildPlan, EveryFlippedBitIsFound) {
+  const testing::ScratchDir scratch;
+  const BuildPlan plan = Inputs().plan();
+  write_build_plan(scratch.path(), plan);
+  EXPECT_THAT(find_damaged_plans(scratch.path()), IsEmpty());
+  const std::filesystem::path file = plan_file(scratch.path(), version_name(plan.name, plan.keys));
+  const std::string sound = manifests::read_file(file);
+  for (std::size_t at = 0; at < sound.size(); ++at) {
+    std::string damaged = sound;
+    damaged[at] = static_cast<char>(damaged[at] ^ (1 << (at % 8)));
+    std::ofstream(file, std::ios::binary) << damaged;
+    const std::vector<DamagedPlan> found = find_damaged_plans(scratch.path());
+    ASSERT_EQ(found.size(), 1U) << "byte " << at;
+    EXPECT_EQ(found[0].file, file);
+  }
+}
+
+TEST(BuildPlan, APlanOfAnEarlierVersionHasNoDigest) {
+  const testing::ScratchDir scratch;
+  const BuildPlan plan = Inputs().plan();
+  write_build_plan(scratch.path(), plan);
+  const std::filesystem::path file = plan_file(scratch.path(), version_name(plan.name, plan.keys));
+  nlohmann::ordered_json document = nlohmann::ordered_json::parse(manifests::read_file(file));
+  document.erase("digest");
+  manifests::write_file_atomically(file, document.dump(2) + "\n");
+  EXPECT_THAT(find_damaged_plans(scratch.path()), IsEmpty());
+  EXPECT_EQ(read_build_plans(scratch.path()).size(), 1U);
 }
 
 TEST(PlanDifference, NamesWhatAKeyWasMadeFrom) {

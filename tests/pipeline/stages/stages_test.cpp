@@ -242,6 +242,17 @@ TEST_F(StageFolder, WritesADamagedManifestAnew) {
   }
 }
 
+TEST_F(StageFolder, EveryFlippedBitOfAManifestIsFound) {
+  open(key_);
+  const std::string sound = manifests::read_file(folder_ / "manifest.json");
+  for (std::size_t at = 0; at < 8 * sound.size(); ++at) {
+    std::string damaged = sound;
+    damaged[at / 8] = static_cast<char>(damaged[at / 8] ^ (1 << (at % 8)));
+    write_manifest(damaged);
+    EXPECT_EQ(key_in_manifest(folder_ / "manifest.json"), std::nullopt) << "bit " << at;
+  }
+}
+
 TEST_F(StageFolder, RefusesADamagedManifestInAFolderOfAnotherName) {
   folder_ = scratch_.path() / "stages" / "predict-of-someone";
   open(key_);
