@@ -84,6 +84,11 @@ void clear_unfinished(const fs::path& out) {
   manifests::write_file_atomically(marker, "a killed run of the world's renderer is made anew\n");
 }
 
+// A power cut after this must not bring the mark back.
+void remove_mark(const fs::path& out) {
+  if (fs::remove(out / kUnfinished)) manifests::sync_folder(out);
+}
+
 // The end of make_world syncs all pictures at once, which is quicker than one by one.
 void write_bytes(const fs::path& path, std::span<const std::uint8_t> bytes) {
   manifests::FileDescriptor file(path, O_WRONLY | O_CREAT | O_TRUNC);
@@ -211,6 +216,7 @@ WorldSummary make_world(const WorldOptions& options) {
     for (const auto& [split, count] : summary.pictures) summary.total += count;
     if (!fs::exists(asset)) save_asset(BodyModel(), asset);
     save_priors(options.out);
+    remove_mark(options.out);  // the run that finished the world was killed before it came to that
     return summary;
   }
   clear_unfinished(options.out);
@@ -221,7 +227,7 @@ WorldSummary make_world(const WorldOptions& options) {
   summary.asset = asset;
   manifests::sync_file_system(options.out);
   write_json(options.out / "world.json", {{"options", options_of(options)}, {"pictures", summary.pictures}});
-  fs::remove(options.out / kUnfinished);
+  remove_mark(options.out);
   return summary;
 }
 

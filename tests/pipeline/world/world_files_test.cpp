@@ -87,8 +87,12 @@ TEST_F(WorldFiles, AnotherSeedGivesOtherPictures) {
 
 TEST_F(WorldFiles, AFinishedWorldIsKeptAndOtherFoldersAreLeftAlone) {
   const auto before = fs::last_write_time(out() / "world.json");
+  const fs::path mark = out() / ".unfinished-world";  // of a run that was killed after its last file
+  EXPECT_FALSE(fs::exists(mark));
+  manifests::write_file_atomically(mark, "");
   EXPECT_TRUE(make_world(options_for(out(), 1)).reused);
   EXPECT_EQ(fs::last_write_time(out() / "world.json"), before);
+  EXPECT_FALSE(fs::exists(mark));
 
   WorldOptions elsewhere = options_for(out(), 1);
   elsewhere.asset = *folder_ / "models" / "body.safetensors";
