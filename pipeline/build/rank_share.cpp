@@ -7,9 +7,11 @@
 
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
 #include <random>
 #include <utility>
 
+#include "manifests/atomic_file.h"
 #include "pipeline/network/torch_network.h"
 #include "pipeline/run/errors.h"
 #include "pipeline/run/interrupt.h"
@@ -44,6 +46,14 @@ void require_stated_threads(const config::BuildConfig& config) {
       "bits of a "
       "result; ranks that share the work on CPUs need the same number on every machine, such as --set "
       "network.compute_threads=4");
+}
+
+// Ranks that were killed while they wrote have left temporary files in the stages' folders. A rank that still
+// writes one has its unit made by another rank.
+void remove_leftovers(const std::filesystem::path& out) {
+  for (const auto& entry : std::filesystem::directory_iterator(out / "stages")) {
+    if (entry.is_directory()) manifests::remove_temporaries(entry.path());
+  }
 }
 
 // A word that no other run has.
@@ -99,6 +109,16 @@ void RankShare::keep_alive(const std::stop_token& stop) {
       return;
     }
     woken_.wait_for(lock, stop, beat, [] { return false; });
+  }
+}
+
+// Asks at once: what this rank heard last may be from before a pause.
+void RankShare::hear_leader() {
+  if (leads()) return;
+  try {
+    if (store_->get(kEnd)) is_over_ = true;
+  } catch (const StoreLost&) {
+    is_store_lost_ = true;
   }
 }
 
@@ -171,10 +191,19 @@ void RankShare::make(unit::UnitFlow flow, device::DeviceWorker& device, const Co
     const std::lock_guard lock(mutex_);
     tell_others_ = std::move(tell_others);
   }
+  has_shared_units_ = true;
   flow.units_in_flight = kUnitsInFlight;
   flow.write = [this, &count, write = std::move(flow.write)](unit::UnitWork& work) {
+    hear_leader();
     if (is_over_) return;  // another rank has made the unit, and the dataset is published
-    write(work);
+    try {
+      write(work);
+    } catch (const std::exception&) {
+      // Rank 0 took this rank for dead, perhaps because it was paused, and has cleared its files away.
+      hear_leader();
+      if (!is_over_ && !is_store_lost_) throw;
+      return;
+    }
     try {
       claims_->finish(work.unit->index, count(work));
     } catch (const StoreLost&) {
@@ -210,7 +239,7 @@ void RankShare::make(unit::UnitFlow flow, device::DeviceWorker& device, const Co
   }
   if (is_store_lost_ && !leads()) {
     throw LeaderLost(fmt::format(
-        "rank {} of {}: rank 0 has ended or cannot be reached. What this rank had begun is finished; run the "
+        "rank {} of {}: rank 0 has ended or cannot be reached. What this rank has finished stays; run the "
         "same command again to go on",
         place_.rank, place_.size));
   }
@@ -233,6 +262,7 @@ void RankShare::end() {
   } catch (const StoreLost&) {
     is_store_lost_ = true;
   }
+  if (has_shared_units_) remove_leftovers(options_.out);
 }
 
 }  // namespace q3d::pipeline::build

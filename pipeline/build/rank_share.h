@@ -25,7 +25,7 @@
 
 namespace q3d::pipeline::build {
 
-// Rank 0 cannot be reached any more. What this rank had open is finished.
+// Rank 0 cannot be reached any more. What this rank has finished stays.
 class LeaderLost : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -70,13 +70,14 @@ class RankShare {
   // Throws LeaderLost, Interrupted, and what the flow throws.
   void make(unit::UnitFlow flow, device::DeviceWorker& device, const Count& count, TellOthers tell_others);
 
-  // Rank 0 has nothing more for the others to do.
+  // Rank 0 has nothing more for the others to do, and clears away what killed ranks have left.
   void end();
 
  private:
   void keep_alive(const std::stop_token& stop);
   std::optional<std::string> await_word(const std::string& key);
   std::optional<std::int64_t> claim(std::int64_t units);
+  void hear_leader();
   void pause();
   void say_farewell();
 
@@ -88,6 +89,7 @@ class RankShare {
   std::unique_ptr<model::ranks::UnitClaims> claims_;
   std::atomic<bool> is_store_lost_ = false;
   std::atomic<bool> is_over_ = false;  // rank 0 needs no more units
+  bool has_shared_units_ = false;
   std::mutex mutex_;
   std::condition_variable_any woken_;
   TellOthers tell_others_;  // guarded by mutex_
