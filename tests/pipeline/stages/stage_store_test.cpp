@@ -2,8 +2,10 @@
 
 #include <gmock/gmock.h>
 
+#include <atomic>
 #include <cerrno>
 #include <fstream>
+#include <thread>
 #include <vector>
 
 #include "manifests/atomic_file.h"
@@ -137,6 +139,38 @@ TEST_F(StageStoreTest, ADamagedJournalLineIsToldAndItsUnitMadeAnew) {
   StageStore again = store();
   EXPECT_THAT(told_, IsEmpty());
   for (const candidates::Unit& unit : units_) EXPECT_TRUE(again.has(unit));
+}
+
+// As in a build: the writer saves units in their order while the threads that decode ask which are there.
+TEST_F(StageStoreTest, OneThreadSavesWhileOthersAsk) {
+  StageStore opened(scratch_.path(), "refine", std::string(64, 'b'));
+  std::vector<candidates::Unit> units;
+  for (int i = 0; i < 30; ++i)
+    units.push_back({i, static_cast<std::size_t>(2 * i), 2, "in" + std::to_string(i), "of"});
+  std::atomic<std::size_t> saved = 0;
+  std::atomic<int> asked = 0, right = 0;
+  std::vector<std::thread> readers;
+  for (int t = 0; t < 4; ++t) {
+    readers.emplace_back([&] {
+      while (saved < units.size()) {
+        const std::size_t there = saved;
+        for (std::size_t i = 0; i < there; ++i) {
+          const auto table = opened.load(units[i]);
+          right += table && table->column<double>("error")[0] == static_cast<double>(i);
+          ++asked;
+        }
+        if (there < units.size()) opened.has(units[there]);  // this moment it may be there or not
+      }
+    });
+  }
+  for (const candidates::Unit& unit : units) {
+    opened.save(unit, table_of(static_cast<double>(unit.index)));
+    ++saved;
+  }
+  for (std::thread& reader : readers) reader.join();
+  EXPECT_GT(asked, 0);
+  EXPECT_EQ(right, asked);
+  EXPECT_THAT(told_, IsEmpty());
 }
 
 }  // namespace
