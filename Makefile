@@ -12,9 +12,12 @@ FUZZ_SECONDS ?= 60
 FUZZ_TARGETS ?=
 KILLS ?= 1000
 FLIPS ?= 300
+DAMAGES ?= 11000
+CUTS ?= 100
+PAUSE ?= 60
 FAULTS ?= 25 --jobs labels
 
-.PHONY: quadruped3d sample-model sample-loop test program build setup test-wheels assets format tidy nightly bench asan fuzz torture clean help
+.PHONY: quadruped3d sample-model sample-loop test program build setup test-wheels assets format tidy nightly bench asan tsan fuzz torture clean help
 
 quadruped3d: program  ## build the dataset that CONFIG describes (default: the rendered sample world)
 	tools/quadruped3d.sh $(OUT) $(CONFIG)
@@ -62,15 +65,26 @@ fuzz: setup  ## fuzz every reader of files for FUZZ_SECONDS each (clang; tests/f
 	cmake --build build/fuzz --parallel $(JOBS) --target fuzz_targets
 	tools/fuzz.sh build/fuzz $(FUZZ_SECONDS) $(FUZZ_TARGETS)
 
-torture: build  ## KILLS kills of all commands, FLIPS damaged files, failing calls; compares what is left (tests/torture)
+tsan: setup  ## tests of what threads share under the thread sanitizer, without LibTorch and oneTBB
+	cmake --preset tsan
+	cmake --build build/tsan --parallel $(JOBS) --target tsan_tests
+	TSAN_OPTIONS=second_deadlock_stack=1 \
+	  ctest --test-dir build/tsan --output-on-failure --parallel $(JOBS) -R "$$(cat build/tsan/tsan_tests.txt)"
+
+torture: build  ## kills, damaged files, failing calls, pauses, power cuts (docs/reliability.md); compares what is left
 	.venv/bin/python tests/torture/torture.py $(KILLS)
 	.venv/bin/python tests/torture/rot.py $(FLIPS)
+	Q3D_DAMAGES=$(DAMAGES) $(BUILD)/tests/pipeline/build/rebuild_test --gtest_filter='Rot.*'
+	Q3D_DAMAGES=$$(($(DAMAGES) / 10)) $(BUILD)/tests/pipeline/training/training_test --gtest_filter='TrainingRot.*'
 	.venv/bin/python tests/torture/faults.py $(FAULTS)
+	[ $(PAUSE) -eq 0 ] || .venv/bin/python tests/torture/pause.py $(PAUSE)
+	[ $(CUTS) -eq 0 ] || .venv/bin/python tests/torture/power_cut.py $(CUTS)
 
 nightly:  ## all that CI has no time for: clang-tidy on every source, tests under the sanitizers, fuzzing, torture
 	$(MAKE) build
 	BUILD=$(BUILD) JOBS=$(JOBS) tools/tidy.sh --all
 	$(MAKE) asan
+	$(MAKE) tsan
 	$(MAKE) fuzz FUZZ_SECONDS=600
 	$(MAKE) torture FAULTS=1
 
