@@ -72,7 +72,11 @@ void remove_all_temporaries(const fs::path& out) {
 ExportFolder::ExportFolder(fs::path out, ordered_json about)
     : out_(std::move(out)), parts_(out_ / ".parts"), about_(std::move(about)) {
   complete_ = open_complete();
-  if (!complete_) open_parts();
+  if (complete_) {
+    drop_parts();  // the run that completed the export was killed before it came to that
+  } else {
+    open_parts();
+  }
 }
 
 void ExportFolder::check_same(const ordered_json& found, const fs::path& file) const {
@@ -168,8 +172,13 @@ void ExportFolder::finish(const ordered_json& summary) {
   manifests::write_file_atomically(out_ / kManifest, manifest_.dump(2) + "\n");
   journal_.reset();
   lock_.reset();
-  fs::remove_all(parts_);
+  drop_parts();
   complete_ = true;
+}
+
+// A power cut after this must not bring them back.
+void ExportFolder::drop_parts() {
+  if (fs::remove_all(parts_) > 0) manifests::sync_folder(out_);
 }
 
 }  // namespace q3d::pipeline::exports

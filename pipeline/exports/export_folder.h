@@ -60,6 +60,7 @@ class ExportFolder {
  private:
   bool open_complete();
   void open_parts();
+  void drop_parts();
   void check_same(const nlohmann::ordered_json& found, const std::filesystem::path& file) const;
 
   std::filesystem::path out_;

@@ -56,6 +56,15 @@ class Exports : public ::testing::Test {
   const std::vector<ShardSample>& samples_ = made_.samples;
 };
 
+TEST_F(Exports, PartsThatAKilledRunHasLeftBesideACompleteExportGo) {
+  run(Format::coco, "coco");
+  const std::filesystem::path parts = scratch_.path() / "coco/.parts";
+  EXPECT_FALSE(std::filesystem::exists(parts));
+  std::filesystem::create_directory(parts);
+  run(Format::coco, "coco");
+  EXPECT_FALSE(std::filesystem::exists(parts));
+}
+
 TEST_F(Exports, PrimaIsLoadedAgainWithEqualErrors) {
   const ExportSummary summary = run(Format::prima, "prima");
   EXPECT_EQ(summary.samples, 8);
