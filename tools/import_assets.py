@@ -44,7 +44,7 @@ def _checkpoint(options) -> None:
         with open(options.config, encoding="utf-8") as file:
             try:
                 settings = json.load(file) | settings
-            except (ValueError, TypeError) as error:
+            except (ValueError, TypeError, RecursionError) as error:
                 raise prima_import.ImportFault(f"{options.config}: not a JSON object: {error}") from None
     prima_import.import_checkpoint(
         options.input,

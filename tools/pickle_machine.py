@@ -162,10 +162,19 @@ class Machine:
         self.push(self.persistent(identity))
 
 
+MAX_KEY_PARTS = 16
+MAX_KEY_LENGTH = 1 << 16
+
+
 def checked_key(key):
-    """Returns the key if it is safe to hash. Hashing recurses without a limit, so nested keys are refused."""
+    """Returns the key if it is safe to hash. Hashing recurses without a limit, so nested keys are refused. A tuple is
+    hashed, and equal texts are compared, each time that they are used, so long ones are refused too."""
     scalars = (str, bytes, bool, float, type(None), Global, Record)
+    if isinstance(key, tuple) and len(key) > MAX_KEY_PARTS:
+        raise RefusedPickle(f"a tuple of {len(key)} parts as the key of a dict or the member of a set")
     for part in key if isinstance(key, tuple) else (key,):
+        if isinstance(part, (str, bytes)) and len(part) > MAX_KEY_LENGTH:
+            raise RefusedPickle(f"a text of {len(part)} characters as the key of a dict or the member of a set")
         # Large integers with equal remainders would all fall into one bucket.
         if not isinstance(part, scalars) and not (isinstance(part, int) and abs(part) < 1 << 60):
             raise RefusedPickle(f"{short(part)} as the key of a dict or the member of a set")

@@ -87,7 +87,9 @@ _NAME = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*", re.ASCII)
 def check_name(module: object, name: object) -> Global:
     for text in (module, name):
         if not isinstance(text, str) or len(text) > MAX_NAME_LENGTH or not _NAME.fullmatch(text):
-            raise RefusedPickle(f"a global with the name {str(text)[:60]!r}, which is not a Python name")
+            # A list may hold others so often that its text would fill the memory.
+            shown = repr(text[:60]) if isinstance(text, str) else f"of type {type(text).__name__}"
+            raise RefusedPickle(f"a global with the name {shown}, which is not a Python name")
     found = Global(_PYTHON2_MODULES.get(module, module), name)
     if found.module.partition(".")[0] in _PROGRAM_MODULES:
         raise RefusedPickle(f"names {found.path}, which can run programs or access files")

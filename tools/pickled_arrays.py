@@ -10,6 +10,7 @@ import re
 
 import numpy as np
 
+from pickle_machine import short
 from restricted_pickle import BrokenPickle, Global, Record
 
 # The largest table in the official SMAL files has 3.6 million numbers. The limit is needed because a sparse matrix can
@@ -18,6 +19,7 @@ MAX_DENSE_ELEMENTS = 1 << 26
 # Lists can hold one list many times over, so that a pickle of 400 bytes describes a table of billions. The official
 # files hold their tables as arrays and use lists for a few sizes only.
 MAX_LIST_ITEMS = 1_000_000
+MAX_AXES = 8
 
 _NUMPY_MAKERS = re.compile(r"numpy\.(_?core)\.(multiarray|numeric)\.(_reconstruct|_frombuffer|scalar)")
 _SPARSE_CLASS = re.compile(r"scipy\.sparse\.(\w+\.)*(csc|csr|coo)_(matrix|array)")
@@ -27,14 +29,18 @@ _PLAIN_DTYPE = re.compile(r"[<>|=]?(b1|[iu][1248]|f[248])")
 def array(value, what: str) -> np.ndarray:
     """Returns the array that `value` describes: a numpy array or scalar, a chumpy array that stores its numbers, a
     number, or a (nested) list of these with equal shapes. Throws BrokenPickle, whose message names `what`."""
-    if isinstance(value, (list, tuple)):
+    try:
         _refuse_bombs(value, what)
-    return _array(value, what)
+        return _array(value, what)
+    except RecursionError:
+        raise BrokenPickle(
+            f"{what} is not a rectangular table of numbers: its lists or objects lie too deep in each other"
+        ) from None
 
 
 def _refuse_bombs(value, what: str) -> None:
-    """Throws BrokenPickle if the table that lists describe is too large to be walked or to be held. Every list and every
-    record is looked at once, however often it is shared."""
+    """Throws BrokenPickle if the table that lists and chumpy arrays describe is too large to be walked or to be held.
+    Each of them is looked at once, however often it is shared, and no array is created that holds others."""
     known: dict[int, tuple[int, int]] = {}
 
     def measure(part) -> tuple[int, int]:
@@ -43,18 +49,18 @@ def _refuse_bombs(value, what: str) -> None:
             return 1, 1
         if id(part) in known:
             return known[id(part)]
-        known[id(part)] = (MAX_LIST_ITEMS + 1, 0)  # for a list that holds itself
-        if isinstance(part, Record):
+        known[id(part)] = (MAX_LIST_ITEMS + 1, 0)  # for one that holds itself
+        if _is_chumpy(part):
+            items, numbers = measure(_chumpy_numbers(part, what))
+            known[id(part)] = (1 + items, numbers)
+        elif isinstance(part, Record):
             known[id(part)] = (1, _array(part, what).size)
         else:
             sizes = [measure(item) for item in part]
             known[id(part)] = (1 + sum(items for items, _ in sizes), sum(numbers for _, numbers in sizes))
         return known[id(part)]
 
-    try:
-        items, numbers = measure(value)
-    except RecursionError:
-        raise BrokenPickle(f"{what} is not a rectangular table of numbers: its lists lie too deep in each other") from None
+    items, numbers = measure(value)
     if items > MAX_LIST_ITEMS or numbers > MAX_DENSE_ELEMENTS:
         raise BrokenPickle(
             f"{what} is a list that describes more than {MAX_LIST_ITEMS:,} items or {MAX_DENSE_ELEMENTS:,} numbers; "
@@ -64,8 +70,8 @@ def _refuse_bombs(value, what: str) -> None:
 
 def _array(value, what: str) -> np.ndarray:
     if isinstance(value, Record):
-        if value.path == "chumpy.ch.Ch":
-            return array(_chumpy_numbers(value, what), what)
+        if _is_chumpy(value):
+            return _array(_chumpy_numbers(value, what), what)
         maker = _NUMPY_MAKERS.fullmatch(value.path)
         if maker is None:
             raise BrokenPickle(f"{what} is a {value.path}, expected an array")
@@ -76,7 +82,7 @@ def _array(value, what: str) -> np.ndarray:
         if isinstance(value, (int, float)):
             return np.asarray(value, np.float64 if isinstance(value, float) else np.int64)
         return np.stack([_array(item, f"{what}[{i}]") for i, item in enumerate(value)])
-    except (ValueError, OverflowError, RecursionError) as error:
+    except (ValueError, OverflowError) as error:
         raise BrokenPickle(f"{what} is not a rectangular table of numbers: {error}") from None
 
 
@@ -86,6 +92,10 @@ def matrix(value, what: str) -> np.ndarray:
     if isinstance(value, Record) and _SPARSE_CLASS.fullmatch(value.path):
         return _dense(value, what)
     return array(value, what)
+
+
+def _is_chumpy(value) -> bool:
+    return isinstance(value, Record) and value.path == "chumpy.ch.Ch"
 
 
 def _chumpy_numbers(record: Record, what: str):
@@ -105,7 +115,7 @@ def _dtype(value, what: str) -> np.dtype:
         raise BrokenPickle(f"{what} has no numpy dtype")
     code = value.args[0]
     if not isinstance(code, str) or not _PLAIN_DTYPE.fullmatch(code):
-        raise BrokenPickle(f"{what} has dtype {str(code)[:20]!r}, expected plain numbers (b1, i1..i8, u1..u8, f2..f8)")
+        raise BrokenPickle(f"{what} has dtype {short(code)}, expected plain numbers (b1, i1..i8, u1..u8, f2..f8)")
     order = value.state[1] if isinstance(value.state, tuple) and len(value.state) > 1 else None
     return np.dtype(code).newbyteorder(order) if order in ("<", ">") else np.dtype(code)
 
@@ -130,12 +140,25 @@ def _bytes(value, what: str) -> bytes:
 
 
 def _shaped(raw: bytes, dtype: np.dtype, shape, fortran: bool, what: str) -> np.ndarray:
-    if not isinstance(shape, tuple) or not all(type(size) is int and size >= 0 for size in shape) or len(shape) > 8:
-        raise BrokenPickle(f"{what} has the shape {str(shape)[:60]}, expected up to 8 sizes")
+    if not isinstance(shape, tuple) or len(shape) > MAX_AXES or not all(map(_is_size, shape)):
+        raise BrokenPickle(f"{what} has the shape {_short(shape)}, expected up to {MAX_AXES} sizes")
     expected = math.prod(shape) * dtype.itemsize
     if len(raw) != expected:
         raise BrokenPickle(f"{what} has {len(raw)} bytes, expected {expected} for {list(shape)} {dtype}")
     return np.frombuffer(raw, dtype).reshape(shape, order="F" if fortran else "C")
+
+
+def _is_size(value) -> bool:
+    return type(value) is int and 0 <= value < 1 << 63
+
+
+def _short(shape) -> str:
+    """A shape for a message. A hostile one may have a million parts of hundreds of digits."""
+    if not isinstance(shape, (list, tuple)):
+        return f"{type(shape).__name__}"
+    if len(shape) > MAX_AXES or not all(map(_is_size, shape)):
+        return f"of {len(shape)} parts"
+    return str(list(shape))
 
 
 def _reconstructed(record: Record, what: str) -> np.ndarray:
@@ -177,9 +200,12 @@ def _dense(record: Record, what: str) -> np.ndarray:
         return numbers
 
     shape = state.get("_shape", state.get("shape"))
-    shape = tuple(int(array(size, f"{what}.shape")) for size in shape) if isinstance(shape, (tuple, list)) else ()
-    if len(shape) != 2 or min(shape) < 1 or math.prod(shape) > MAX_DENSE_ELEMENTS:
-        raise BrokenPickle(f"{what} has the shape {shape}, expected two sizes, at most {MAX_DENSE_ELEMENTS} numbers")
+    if isinstance(shape, (tuple, list)) and len(shape) == 2:
+        shape = tuple(_whole(size, f"{what}.shape") for size in shape)
+    if not isinstance(shape, tuple) or len(shape) != 2 or min(shape) < 1 or math.prod(shape) > MAX_DENSE_ELEMENTS:
+        raise BrokenPickle(
+            f"{what} has the shape {_short(shape)}, expected two sizes, at most {MAX_DENSE_ELEMENTS} numbers"
+        )
     values = part("data")
     kind = _SPARSE_CLASS.fullmatch(record.path)[2]
     if kind == "coo":
@@ -195,6 +221,13 @@ def _dense(record: Record, what: str) -> np.ndarray:
     dense = np.zeros(shape, values.dtype)
     np.add.at(dense, (rows.astype(np.int64), columns.astype(np.int64)), values)
     return dense
+
+
+def _whole(value, what: str) -> int:
+    number = array(value, what)
+    if number.ndim != 0 or number.dtype.kind not in "iu":
+        raise BrokenPickle(f"{what} holds an array of {number.dtype} with {number.ndim} axes, expected a whole number")
+    return int(number)
 
 
 def _inside(index: np.ndarray, size: int) -> bool:

@@ -26,6 +26,7 @@ OFFICIAL_DOMAIN = {
 }
 _WEIGHT_DTYPES = ("F32", "F16", "BF16")
 _MAX_FAULTS_SHOWN = 40
+_MAX_LAYERS = 10_000  # a hostile file's config could ask for the names of a billion
 
 Say = Callable[[str], None]
 
@@ -141,6 +142,13 @@ def _same_kind(value, like) -> bool:
     return isinstance(value, int) or (isinstance(like, float) and isinstance(value, float))
 
 
+def _is_like_official(key: str, value) -> bool:
+    """Whether a value of a config has the official one's type, and a count is one from which names can be made."""
+    if not _same_kind(value, names.OFFICIAL_CONFIG[key]):
+        return False
+    return not key.endswith(("depth", "layers")) or 0 <= value <= _MAX_LAYERS
+
+
 def _setting(node, place: Sequence[str]):
     """Returns a value of the hyperparameters, or None when it is absent. They may be dicts, yacs nodes (records with
     dict items), or omegaconf nodes (records whose state holds `_content` and, in the leaves, `_val`)."""
@@ -200,7 +208,7 @@ def _open_clip_settings(path: str, sizes: Mapping) -> dict:
         quick_gelu, head_width = model.get("quick_gelu", False), vision.get("head_width", 64)
         told = {"clip_width": vision["width"], "clip_layers": vision["layers"], "clip_out": model["embed_dim"]}
         patch = vision.get("patch_size", names.PATCH_PX)
-    except (ValueError, KeyError, AttributeError, TypeError) as error:
+    except (ValueError, KeyError, AttributeError, TypeError, RecursionError) as error:
         raise ImportFault(f"{path}: not an open_clip_config.json ({type(error).__name__}: {error})") from None
     if not isinstance(quick_gelu, bool):
         raise ImportFault(f"{path}: model_cfg.quick_gelu is {quick_gelu!r}, expected true or false")
@@ -228,9 +236,11 @@ def _merge(
     tensors, metadata = safetensors_file.read(base)
     try:
         config = names.OFFICIAL_CONFIG | json.loads(metadata[CONFIG_KEY])
-    except (KeyError, ValueError, TypeError):
+        if unlike := [key for key in config if key in names.OFFICIAL_CONFIG and not _is_like_official(key, config[key])]:
+            raise ValueError(unlike)
+    except (KeyError, ValueError, TypeError, RecursionError):
         raise ImportFault(
-            f"{base}: no '{CONFIG_KEY}' in its metadata; create the file with `import_assets.py checkpoint` or with "
+            f"{base}: no usable '{CONFIG_KEY}' in its metadata; create the file with `import_assets.py checkpoint` or with "
             "`quadruped3d init --size vith`"
         ) from None
     config.update(sizes)

@@ -19,6 +19,8 @@ CHUNK_BYTES = 8 << 20
 MAX_HEADER_BYTES = 100_000_000  # the format's own limit
 SOURCE_KEY = "imported_from"  # in the metadata of every imported file
 
+MAX_AXES = 32  # numpy's limit; the network's tensors have up to four
+
 _NUMPY_NAMES = {"float64": "F64", "float32": "F32", "float16": "F16", "int64": "I64", "int32": "I32", "bool": "BOOL"}
 
 
@@ -40,6 +42,11 @@ class Tensor:
 
     def __str__(self) -> str:
         return f"{self.dtype} {list(self.shape)}"
+
+
+def are_sizes(numbers: Iterable) -> bool:
+    """Whether all are whole numbers that a size or an offset can be. Products of larger ones would take hours."""
+    return all(type(number) is int and 0 <= number < 1 << 63 for number in numbers)
 
 
 def from_array(values: np.ndarray) -> Tensor:
@@ -141,16 +148,16 @@ def _entry(path: str, data_start: int, data_bytes: int, name: str, entry: object
     fields = entry if isinstance(entry, dict) else {}
     dtype, shape, offsets = (fields.get(key) for key in ("dtype", "shape", "data_offsets"))
     if not isinstance(dtype, str) or dtype not in ITEM_BYTES:
-        raise TensorFileError(f"{name}: dtype {str(dtype)[:20]!r}, expected one of {', '.join(ITEM_BYTES)}")
+        raise TensorFileError(f"{name[:200]}: dtype {str(dtype)[:20]!r}, expected one of {', '.join(ITEM_BYTES)}")
     for numbers in (shape, offsets):
-        if not isinstance(numbers, list) or not all(type(number) is int and number >= 0 for number in numbers):
-            raise TensorFileError(f"{name}: its shape and data_offsets are not lists of sizes")
+        if not isinstance(numbers, list) or len(numbers) > MAX_AXES or not are_sizes(numbers):
+            raise TensorFileError(f"{name[:200]}: its shape and data_offsets are not lists of up to {MAX_AXES} sizes")
     if len(offsets) != 2 or not offsets[0] <= offsets[1] <= data_bytes:
-        raise TensorFileError(f"{name}: data_offsets {offsets} outside the {data_bytes} bytes of data (truncated?)")
+        raise TensorFileError(f"{name[:200]}: data_offsets {offsets} outside the {data_bytes} bytes of data (truncated?)")
     start, end = data_start + offsets[0], data_start + offsets[1]
     tensor = Tensor(dtype, tuple(shape), lambda: _pieces(path, start, end))
     if end - start != tensor.byte_count:
-        raise TensorFileError(f"{name}: {end - start} bytes, expected {tensor.byte_count} from its shape and dtype")
+        raise TensorFileError(f"{name[:200]}: {end - start} bytes, expected {tensor.byte_count} from its shape and dtype")
     return tensor
 
 

@@ -156,9 +156,13 @@ def _check_rows_sum_to_one(what: str, rows: np.ndarray, tolerance: float = 1e-3)
 def _precision_factors(source: str, covariances: np.ndarray) -> np.ndarray:
     """Returns the lower Cholesky factors L with L L^T = (covariance + 1e-5 I)^-1, as in the official ShapePriorLoss."""
     try:
-        return np.linalg.cholesky(np.linalg.inv(covariances + 1e-5 * np.eye(BETAS)))
+        with np.errstate(all="ignore"):  # what overflows is reported below
+            factors = np.linalg.cholesky(np.linalg.inv(covariances + 1e-5 * np.eye(BETAS)))
     except np.linalg.LinAlgError as error:
         raise BrokenPickle(f"{source}: cluster_cov holds a matrix that is not a covariance ({error})") from None
+    if not np.isfinite(factors).all():
+        raise BrokenPickle(f"{source}: cluster_cov holds a matrix whose inverse is not finite")
+    return factors
 
 
 def _check_pose_factor(pose: _Table, factor: np.ndarray, tolerance: float = 1e-6) -> None:
@@ -166,8 +170,9 @@ def _check_pose_factor(pose: _Table, factor: np.ndarray, tolerance: float = 1e-6
     if "cov" not in pose.fields:
         return
     covariance = pose.numbers("cov", factor.shape, np.float64)
-    difference = np.abs(factor @ factor.T @ covariance - np.eye(len(factor))).max()
-    if difference > tolerance:
+    with np.errstate(all="ignore"):  # what overflows is not a number, and reported below
+        difference = np.abs(factor @ factor.T @ covariance - np.eye(len(factor))).max()
+    if not difference <= tolerance:  # also where it is not a number
         raise BrokenPickle(
             f"{pose.path}: pic pic^T cov differs from the identity by {difference:.3g}, so pic does not belong to cov"
         )

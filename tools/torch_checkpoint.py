@@ -18,10 +18,14 @@ from typing import Iterator
 import numpy as np
 
 import restricted_pickle
+from pickle_machine import short
 from restricted_pickle import Global, Record, RefusedPickle
-from safetensors_file import CHUNK_BYTES, ITEM_BYTES, Tensor, TensorFileError, walk
+from safetensors_file import CHUNK_BYTES, ITEM_BYTES, MAX_AXES, Tensor, TensorFileError, are_sizes, walk
 
 MAX_ENTRIES = 100_000
+MAX_DIRECTORY_BYTES = 32 << 20  # of the zip; zipfile makes an object of ten times its size of each entry
+# Tensors may share their numbers. Without a limit, a file of 1 GB could describe a thousand networks.
+MAX_SHARING = 8
 MAX_PICKLE_BYTES = 256 << 20
 
 _STORAGE_DTYPES = {
@@ -47,6 +51,21 @@ class _Storage:
     kind: str  # a key of _STORAGE_DTYPES if the type is supported
     key: str
     count: int  # how many numbers it holds
+
+
+class _BoundedFile:
+    """A file from which zipfile reads no larger directory than MAX_DIRECTORY_BYTES."""
+
+    def __init__(self, file, path: str):
+        self._file, self._path = file, path
+        self.seek, self.tell = file.seek, file.tell
+
+    def read(self, count: int = -1) -> bytes:
+        if not 0 <= count <= MAX_DIRECTORY_BYTES:
+            raise TensorFileError(
+                f"{self._path}: a zip directory of {count} bytes, expected at most {MAX_DIRECTORY_BYTES}"
+            )
+        return self._file.read(count)
 
 
 class TorchFile:
@@ -85,13 +104,20 @@ class TorchFile:
         if not isinstance(entries, dict):
             raise TensorFileError(f"{self.path}: {what} is a {_kind(table)}, expected a table of tensors")
         tensors = {}
+        left = MAX_SHARING * len(self._bytes)
         for name, value in entries.items():
             if not isinstance(name, str):
-                raise TensorFileError(f"{self.path}: {what} has the key {str(name)[:60]!r}, expected names")
+                raise TensorFileError(f"{self.path}: {what} has the key {short(name)}, expected names")
             try:
                 tensors[name] = self._tensor(value)
             except TensorFileError as error:
                 raise TensorFileError(f"{self.path}: {what}: {name[:200]}: {error}") from None
+            left -= tensors[name].byte_count
+            if left < 0:
+                raise TensorFileError(
+                    f"{self.path}: {what} describes more than {MAX_SHARING} times as many bytes as the file has; its"
+                    " tensors share their numbers more often than those of any known file"
+                )
         return tensors
 
     # --- the zip archive ---
@@ -103,7 +129,7 @@ class TorchFile:
                 "again with a newer torch: torch.save(torch.load(IN, weights_only=True), OUT)"
             )
         try:
-            with zipfile.ZipFile(file) as archive:
+            with zipfile.ZipFile(_BoundedFile(file, self.path)) as archive:
                 infos = archive.infolist()
         except (zipfile.BadZipFile, NotImplementedError, ValueError, struct.error, EOFError) as error:
             reason = _impostor(self._start) or f"not a whole torch file: {error}"
@@ -202,16 +228,16 @@ class TorchFile:
         return self._view(storage, offset, shape, strides)
 
     def _view(self, storage: _Storage, offset, shape, strides) -> Tensor:
-        numbers = [offset, *shape, *strides] if isinstance(shape, tuple) and isinstance(strides, tuple) else [None]
-        if not all(type(number) is int and number >= 0 for number in numbers) or len(shape) != len(strides):
-            raise TensorFileError("a tensor whose offset, sizes and strides are not sizes")
+        are_lists = isinstance(shape, tuple) and isinstance(strides, tuple) and len(shape) == len(strides)
+        if not are_lists or len(shape) > MAX_AXES or not are_sizes([offset, *shape, *strides]):
+            raise TensorFileError(f"a tensor whose offset, sizes and strides are not sizes of up to {MAX_AXES} axes")
         dtype = _STORAGE_DTYPES.get(storage.kind)
         if dtype is None:
             raise TensorFileError(f"a {storage.kind}, expected one of {', '.join(_STORAGE_DTYPES)}")
         item = ITEM_BYTES[dtype]
         name = f"{self._prefix}data/{storage.key}"
         if name not in self._entries:
-            raise TensorFileError(f"its storage {name!r} is not in the file")
+            raise TensorFileError(f"its storage {name[:200]!r} is not in the file")
         data = self._data_of(self._entries[name])
         if len(data) != storage.count * item:
             raise TensorFileError(f"its storage has {len(data)} bytes, expected {storage.count * item}")

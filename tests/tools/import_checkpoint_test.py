@@ -396,7 +396,10 @@ class MergeTest(CheckpointCase):
         torch.save(self.part("backbone.", ""), self.source)
         safetensors_file.write(str(self.base), {}, {})
         merge = ("backbone", self.source, "--into", self.base, self.target)
-        self.assert_fails(support.run(*merge), "base.safetensors: no 'prima_config' in its metadata")
+        self.assert_fails(support.run(*merge), "base.safetensors: no usable 'prima_config' in its metadata")
+        for config in ("[" * 100_000, "[]", '{"depth": 1000000000}', '{"dec_layers": "6"}', '{"embed_dim": null}'):
+            safetensors_file.write(str(self.base), {}, {"prima_config": config})
+            self.assert_fails(support.run(*merge), "base.safetensors: no usable 'prima_config' in its metadata")
         whole = b"\x10\0\0\0\0\0\0\0" + b'{"a":{"dtype":1}'
         for content, mention in ((b"", "0 bytes"), (b"\xff" * 64, "a header of"), (whole, "not JSON")):
             self.base.write_bytes(content)

@@ -207,6 +207,7 @@ class PriorsTest(AssetCase):
             (({"cluster_means": self.means[:4]},), "families.pkl: cluster_means has the shape [4, 41], expected [5"),
             (({}, {"pic": self.factor[:30, :30]}), "pose.pkl: pic has the shape [30, 30], expected [105, 105]"),
             (({}, {"cov": 2 * self.pose_covariance}), "pose.pkl: pic pic^T cov differs from the identity"),
+            (({}, {"pic": np.full((105, 105), 1e200)}), "pose.pkl: pic pic^T cov differs from the identity by nan"),
             (({}, {"mean_pose": None}), "pose.pkl: mean_pose is a NoneType"),
         ):
             with self.subTest(mention=mention):

@@ -76,6 +76,9 @@ class NumpyTest(unittest.TestCase):
                 self.assertLess(time.process_time() - started, 10.0)
                 self.assertLess(tracemalloc.get_traced_memory()[1], 2 * len(data) + 10_000_000)
                 tracemalloc.stop()
+        record = read(pickle.dumps(np.zeros(2), 2))
+        record.state[2].args = (laughs,)
+        self.assertRaisesRegex(BrokenPickle, "has dtype a list, expected", array, record, "x")
         deep = [1.0]
         for _ in range(5_000):
             deep = [deep]
@@ -126,6 +129,53 @@ class ChumpyTest(unittest.TestCase):
             array(second, "field")
 
 
+    def chumpy_pickle(self, make):
+        """Pickles what `make` returns, to which it is given a function that makes a chumpy array of some numbers."""
+        with support.foreign_classes(("chumpy.ch.Ch", object)) as made:
+
+            def chumpy(numbers=None):
+                record = made.Ch()
+                record.x = numbers
+                return record
+
+            return pickle.dumps(make(chumpy), 2)
+
+    def test_chumpy_arrays_that_hold_each_other(self):
+        """Each holds the next in a list of one: a walk that looks at each list twice takes 2^24 steps."""
+
+        def nested(chumpy):
+            value = 1.0
+            for _ in range(24):
+                value = [chumpy(value)]
+            return value
+
+        started = time.process_time()
+        self.assertEqual(array(read(self.chumpy_pickle(nested)), "x").shape, (1,) * 24)
+        self.assertLess(time.process_time() - started, 5.0)
+
+    def test_chumpy_arrays_without_an_end(self):
+        def itself(chumpy):
+            record = chumpy()
+            record.x = record
+            return record
+
+        with self.assertRaisesRegex(BrokenPickle, "no known file has such a list"):
+            array(read(self.chumpy_pickle(itself)), "x")
+        chain = b"cchumpy.ch\nCh\nq\x00)\x81}X\x01\x00\x00\x00x"
+        data = b"\x80\x02" + chain * 5_000 + b"K\x01" + b"sb" * 5_000 + b"."
+        with self.assertRaisesRegex(BrokenPickle, "too deep in each other"):
+            array(read(data), "x")
+
+    def test_shapes_that_are_no_sizes(self):
+        good = np.zeros((2, 3))
+        record = read(pickle.dumps(good, 2))
+        for shape in ((1 << 70, 0), (-1, 2), ("2", 3), (1,) * 9, ((1 << 2000),) * 100_000):
+            record.state = (1, shape, *record.state[2:])
+            with self.assertRaisesRegex(BrokenPickle, "expected up to 8 sizes") as caught:
+                array(record, "x")
+            self.assertLess(len(str(caught.exception)), 200)
+
+
 class ScipyTest(unittest.TestCase):
     # The matrix [[0, 1, 0], [2, 0, 3]] in the three layouts, written by hand.
     DENSE = np.array([[0.0, 1.0, 0.0], [2.0, 0.0, 3.0]])
@@ -145,6 +195,9 @@ class ScipyTest(unittest.TestCase):
         good = self.CSC | {"_shape": (2, 3)}
         for change, message in (
             ({"_shape": (2**20, 2**20)}, "shape"),
+            ({"_shape": (2, np.array([1, 2]))}, "expected a whole number"),
+            ({"_shape": (2, 3.0)}, "expected a whole number"),
+            ({"_shape": (2,) * 100_000}, "of 100000 parts, expected two sizes"),
             ({"_shape": (2, 4)}, "indptr"),
             ({"_shape": (1, 3)}, "row index"),
             ({"indices": np.array([1, 0, -1])}, "row index"),

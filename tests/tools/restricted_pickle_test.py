@@ -224,12 +224,20 @@ class HostileTest(unittest.TestCase):
                 self.assertLess(peak, 150 * len(data) + 1_000_000)
         self.assert_refused(b"N0" * (MAX_OPCODES // 2) + b"N.", "opcodes")
 
+    def test_keys_that_take_long_to_hash_or_to_compare(self):
+        long_tuple = b"(" + b"N" * 300_000 + b"t\x94"
+        self.assert_refused(b"\x80\x04" + long_tuple + b"0}(" + b"h\x00N" * 200_000 + b"u.", "a tuple of 300000 parts")
+        text = b"B" + (1 << 20).to_bytes(4, "little") + bytes(1 << 20) + b"\x94"
+        self.assert_refused(b"\x80\x04}" + text + b"Ns.", "a text of 1048576 characters")
+
     def test_deep_and_wide_objects_are_harmless(self):
         deep = b"]" * 200_000 + b"a" * 199_999 + b"."
         self.assertEqual(len(read(deep)), 1)
         # Every list holds the previous one twice: there are 60 lists in memory, but a walk over them visits 2^60.
         layers = [b"]q" + bytes([i]) + b"(" + 2 * (b"h" + bytes([i - 1])) + b"e" for i in range(1, 61)]
         self.assertEqual(len(read(b"(]q\x00" + b"".join(layers) + b"t.")), 61)
+        # Its text would be as long as the walk, so it is in no message.
+        self.assert_refused(b"]q\x00" + b"".join(layers) + b"N\x93.", "a global with the name of type list")
 
     def test_lengths_beyond_the_end_of_the_file(self):
         longest = b"\xff\xff\xff\xff"

@@ -1,6 +1,7 @@
 """Reads files of torch.save without torch, and compares them with torch's own tensors."""
 
 import io
+import json
 import os
 import pathlib
 import pickle
@@ -10,6 +11,7 @@ import unittest
 import zipfile
 
 import support  # first of ours: it sets the path
+import safetensors_file
 import torch
 from restricted_pickle import RefusedPickle
 from safetensors_file import TensorFileError
@@ -211,11 +213,36 @@ class HostileTest(TorchFileCase):
             (0, (4,), (-1,), "sizes"),
             (0, (4,), (1, 1), "sizes"),
             (0, [4], (1,), "sizes"),
+            (0, (1 << 63,), (0,), "sizes"),
+            # A product of these has a million digits.
+            (0, (1 << 2000,) * 10_000, (0,) * 10_000, "sizes"),
+            (0, (1,) * 33, (0,) * 33, "sizes"),
         ):
-            with self.subTest(shape=shape, offset=offset):
+            with self.subTest(shape=str(shape)[:60], offset=offset):
                 storage = _Id(("storage", torch.FloatStorage, "0", "cpu", 4))
                 tensor = _Rebuild(torch._utils._rebuild_tensor_v2, (storage, offset, shape, strides, False, {}))
                 self.refuse({"w": tensor}, mention, error=TensorFileError)
+
+    def test_many_tensors_of_one_storage(self):
+        """A file of 40 kB that describes 40 MB."""
+        weights = torch.zeros(10_000)
+        self.save({str(i): weights for i in range(1_000)})
+        file = TorchFile(self.path)
+        with self.assertRaisesRegex(TensorFileError, "8 times as many bytes as the file has"):
+            file.tensors(file.root, "root")
+
+    def test_a_zip_directory_that_would_fill_the_memory(self):
+        end = struct.pack("<4s4H2LH", b"PK\5\6", 0, 0, 0xFFFF, 0xFFFF, 40 << 20, 0, 0)
+        pathlib.Path(self.path).write_bytes(b"PK\3\4" + bytes((40 << 20) - 4) + end)
+        with self.assertRaisesRegex(TensorFileError, "a zip directory of 41943040 bytes"):
+            TorchFile(self.path)
+
+    def test_sizes_of_a_safetensors_file_that_are_none(self):
+        for shape in ([10**4000] * 2_000, [1] * 33, [1 << 63], [-1], [1.0], ["1"]):
+            header = json.dumps({"w": {"dtype": "F32", "shape": shape, "data_offsets": [0, 4]}}).encode()
+            pathlib.Path(self.path).write_bytes(len(header).to_bytes(8, "little") + header + bytes(4))
+            with self.assertRaisesRegex(TensorFileError, "w: its shape and data_offsets"):
+                safetensors_file.read(self.path)
 
     def test_dtypes_that_the_network_never_has(self):
         storage = _Id(("storage", torch.ComplexFloatStorage, "0", "cpu", 2))
