@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import html
+import json
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -46,7 +48,7 @@ def card_of(manifest: Mapping[str, Any], splits: Sequence[str], schema_names: Se
     """The text of README.md, with the header that Hugging Face reads."""
     parts = [
         _header(manifest, splits),
-        f"# {manifest['name']} {manifest['version']}\n\n{summary_of(manifest)}",
+        f"# {_cell(str(manifest['name']))} {_cell(str(manifest['version']))}\n\n{summary_of(manifest)}",
         _use(splits, pictures),
         _counts(manifest),
         _thresholds(manifest),
@@ -75,7 +77,8 @@ def _header(manifest: Mapping[str, Any], splits: Sequence[str]) -> str:
 
 
 def _quoted(text: str) -> str:
-    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    """YAML's quoted text, which may hold what JSON's may; a line break in a name must not begin a new key."""
+    return json.dumps(text, ensure_ascii=False)
 
 
 def _use(splits: Sequence[str], pictures: bool) -> str:
@@ -87,9 +90,14 @@ def _use(splits: Sequence[str], pictures: bool) -> str:
     )
 
 
+def _cell(text: str) -> str:
+    """A cell shows names of species and datasets, whoever chose them, as text: neither as HTML nor as a new row."""
+    return html.escape(" ".join(text.splitlines()), quote=False).replace("|", "\\|")
+
+
 def _table(head: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
     def line(cells: Sequence[Any]) -> str:
-        return "| " + " | ".join(str(cell).replace("|", "\\|").replace("\n", " ") for cell in cells) + " |"
+        return "| " + " | ".join(_cell(str(cell)) for cell in cells) + " |"
 
     return "\n".join([line(head), "|" + "---|" * len(head), *(line(row) for row in rows)])
 

@@ -48,6 +48,14 @@ def write_atomically(path: pathlib.Path, write: Callable[[pathlib.Path], None]) 
         os.close(folder)
 
 
+def _file_name(name: Any) -> str:
+    """A name of a file below the folder. A manifest may be a stranger's, whose names must lead nowhere else."""
+    parts = name.split("/") if isinstance(name, str) else [""]
+    if any(part in ("", ".", "..") or not part.isprintable() or set(part) & set("\\:") for part in parts):
+        raise ValueError(f"it lists {name!r}, expected a file below its folder")
+    return str(name)
+
+
 class ExportFolder:
     """The files of one export. `about` says what is exported and how; equal exports have equal words there."""
 
@@ -75,12 +83,17 @@ class ExportFolder:
         file = self.out / MANIFEST
         if not file.exists():
             return False
-        manifest = json.loads(file.read_text(encoding="utf-8"))
-        self._refuse_other(manifest)
-        self.files = {str(entry["file"]): entry for entry in manifest["files"]}
+        try:
+            manifest = json.loads(file.read_text(encoding="utf-8"))
+            self._refuse_other(manifest)
+            self.files = {_file_name(entry["file"]): entry for entry in manifest["files"]}
+        except (ValueError, RecursionError, AttributeError, KeyError, TypeError) as error:
+            raise ExportError(
+                f"{file}: not what an export writes: {error}; remove {self.out} and export again"
+            ) from error
         for name, entry in self.files.items():
             path = self.out / name
-            if not path.is_file() or sha256_file(path) != entry["sha256"]:
+            if not path.is_file() or sha256_file(path) != entry.get("sha256"):
                 raise ExportError(f"{path}: is gone or differs from {file}; remove {self.out} and export again")
         return True
 
