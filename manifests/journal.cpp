@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string_view>
@@ -12,13 +11,16 @@
 #include "manifests/atomic_file.h"
 #include "manifests/checked_line.h"
 #include "manifests/file_descriptor.h"
+#include "manifests/file_name.h"
+#include "manifests/json_number.h"
 #include "manifests/json_parse.h"
 
 namespace q3d::manifests {
 namespace {
 
-bool stays_in_folder(const std::filesystem::path& file) {
-  return file.is_relative() && std::find(file.begin(), file.end(), "..") == file.end();
+// A unit that left no file has an empty name.
+bool stays_in_folder(const std::string& file) {
+  return file.empty() || leads_below(file);
 }
 
 std::string to_payload(const JournalEntry& entry) {
@@ -33,14 +35,14 @@ std::optional<JournalEntry> parse_line(std::string_view line) {
   if (!payload) return std::nullopt;
   try {
     const auto json = parse_json<nlohmann::json>(*payload);
-    JournalEntry entry{json.at("unit").get<std::int64_t>(),  json.at("input").get<std::string>(),
-                       json.at("file").get<std::string>(),   json.at("sha256").get<std::string>(),
-                       json.at("bytes").get<std::int64_t>(), json.at("rows").get<std::int64_t>()};
+    JournalEntry entry{whole_number(json.at("unit")),      json.at("input").get<std::string>(),
+                       json.at("file").get<std::string>(), json.at("sha256").get<std::string>(),
+                       whole_number(json.at("bytes")),     whole_number(json.at("rows"))};
     if (!stays_in_folder(entry.file)) return std::nullopt;
     return entry;
   } catch (const nlohmann::json::exception&) {
     return std::nullopt;
-  } catch (const std::runtime_error&) {  // too deep, or a key twice
+  } catch (const std::runtime_error&) {  // too deep, a key twice, or a number that is none
     return std::nullopt;
   }
 }

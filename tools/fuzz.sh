@@ -30,4 +30,25 @@ while read -r name inputs; do
   fi
   grep -E "^stat::number_of_executed_units|^stat::peak_rss_mb" "$log"
 done <"$build/tests/fuzz/targets.txt"
-echo "fuzz: no promise was broken"
+
+# The importers of official files, which are Python.
+if ((${#wanted[@]} == 0)) || [[ " ${wanted[*]} " == *" importers "* ]]; then
+  python=${FUZZ_PYTHON:-$here/.venv/bin/python}
+  if ! "$python" -c "import atheris, numpy" 2>/dev/null; then
+    echo "fuzz: importers was NOT fuzzed: $python has no atheris. Install atheris and numpy from PyPI into a virtual"
+    echo "environment of their own, and name its python in FUZZ_PYTHON."
+  else
+    mkdir -p "$build/corpus/importers" "$build/findings/importers"
+    echo "== importers, $seconds s"
+    log="$build/findings/importers.log"
+    if ! "$python" "$here/tests/fuzz/importers_fuzz.py" "$build/corpus/importers" "$here/tests/fuzz/corpus/importers" \
+        -max_total_time="$seconds" -timeout=30 -rss_limit_mb=3072 -max_len=65536 -print_final_stats=1 \
+        -artifact_prefix="$build/findings/importers/" >"$log" 2>&1; then
+      tail -n 60 "$log"
+      echo "fuzz: importers broke a promise; its input is in $build/findings/importers"
+      exit 1
+    fi
+    grep -E "^stat::number_of_executed_units|^stat::peak_rss_mb|^Done" "$log"
+  fi
+fi
+echo "fuzz: no promise was broken by the targets that ran"

@@ -85,8 +85,9 @@ std::optional<std::vector<std::string>> folders_below(const fs::path& folder, co
 }
 
 std::optional<std::string> to_text(std::vector<StampedFile> files) {
-  std::sort(files.begin(), files.end(),
-            [](const StampedFile& a, const StampedFile& b) { return a.path < b.path; });
+  // Stable, so that equal lists give equal text also where a path is in them twice.
+  std::stable_sort(files.begin(), files.end(),
+                   [](const StampedFile& a, const StampedFile& b) { return a.path < b.path; });
   std::string text;
   for (const StampedFile& file : files) {
     if (file.path.find('\n') != std::string::npos) return std::nullopt;

@@ -108,13 +108,8 @@ UpToDateRecord::UpToDateRecord(const fs::path& out, const config::BuildConfig& c
       request_(request_digest(out, config, rules, device_key)),
       begun_ns_(now_ns()) {}
 
-std::optional<UpToDateRecord::Unchanged> UpToDateRecord::unchanged() const {
-  const fs::path file = record_file(out_, request_);
-  if (config_.leakage || !fs::exists(file)) return std::nullopt;
-  const std::string content = manifests::read_file(file);
-  std::string_view text = content;
-  const std::string_view head = manifests::next_field(text, '\n');
-  if (head != manifests::sha256(text) + ' ' + request_) return std::nullopt;
+// The record's lines after its head. Throws json::exception and std::invalid_argument for others.
+std::optional<UpToDateRecord::Unchanged> UpToDateRecord::read(std::string_view text) const {
   const json said = json::parse(manifests::next_field(text, '\n'));
   if (!have_stamps(stamps_from_text(text))) return std::nullopt;
   Unchanged found{out_ / said.at("folder").get<std::string>(),
@@ -127,6 +122,22 @@ std::optional<UpToDateRecord::Unchanged> UpToDateRecord::unchanged() const {
                            note.at(2).get<std::string>()});
   }
   return found;
+}
+
+std::optional<UpToDateRecord::Unchanged> UpToDateRecord::unchanged() const {
+  const fs::path file = record_file(out_, request_);
+  if (config_.leakage || !fs::exists(file)) return std::nullopt;
+  const std::string content = manifests::read_file(file);
+  std::string_view text = content;
+  const std::string_view head = manifests::next_field(text, '\n');
+  if (head != manifests::sha256(text) + ' ' + request_) return std::nullopt;
+  try {
+    return read(text);
+  } catch (const json::exception&) {
+    return std::nullopt;
+  } catch (const std::invalid_argument&) {
+    return std::nullopt;
+  }
 }
 
 std::optional<std::vector<std::string>> UpToDateRecord::inputs(const candidates::Ingest& ingest) const {

@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "pipeline/candidates/ingest.h"
@@ -42,6 +43,7 @@ class UpToDateRecord {
   void keep(const candidates::Ingest& ingest, const std::filesystem::path& folder) const;
 
  private:
+  std::optional<Unchanged> read(std::string_view text) const;
   std::optional<std::vector<std::string>> inputs(const candidates::Ingest& ingest) const;
 
   std::filesystem::path out_;

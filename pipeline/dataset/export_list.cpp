@@ -11,6 +11,7 @@
 #include "manifests/atomic_file.h"
 #include "manifests/digest.h"
 #include "manifests/file_descriptor.h"
+#include "manifests/file_name.h"
 #include "manifests/json_parse.h"
 #include "pipeline/run/log.h"
 
@@ -34,7 +35,8 @@ fs::path list_folder(const fs::path& out) {
 std::optional<ListedExport> read_entry(const fs::path& file) {
   const json entry = manifests::parse_json_or_null<json>(manifests::read_file(file));
   try {
-    if (entry.at("format") == kFormat) {
+    const bool is_folder = entry.at("folder").get<std::string>().find('\0') == std::string::npos;
+    if (entry.at("format") == kFormat && is_folder) {
       return ListedExport{entry.at("export").get<std::string>(), entry.at("version").get<std::string>(),
                           entry.at("content_id").get<std::string>(), entry.at("pictures_anyway").get<bool>(),
                           entry.at("folder").get<std::string>()};
@@ -70,14 +72,25 @@ std::string key_of(const json& about) {
   return manifests::sha256(parts.dump());
 }
 
+// Whether an entry of an export's manifest is a file below the folder, of the listed size.
+bool is_there(const json& entry, const fs::path& folder, std::string& name) {
+  if (!entry.is_object() || !entry.value("file", json()).is_string()) return false;
+  name = entry.at("file").get<std::string>();
+  if (!manifests::leads_below(name)) return false;
+  std::error_code error;
+  const std::uintmax_t size = fs::file_size(folder / name, error);
+  return !error && entry.value("bytes", json()) == size;
+}
+
 std::vector<std::string> damaged_files(const json& manifest, const fs::path& folder) {
   std::vector<std::string> damaged;
   for (const char* list : {"files", "picture_files"}) {
-    for (const json& entry : manifest.value(list, json::array())) {
-      const std::string name = entry.value("file", std::string());
-      std::error_code error;
-      const std::uintmax_t size = fs::file_size(folder / name, error);
-      if (error || size != entry.value("bytes", std::uintmax_t{0})) damaged.push_back(name);
+    const json files = manifest.value(list, json());
+    if (files.is_null()) continue;
+    if (!files.is_array()) return {"export.json"};
+    for (const json& entry : files) {
+      std::string name = "export.json";
+      if (!is_there(entry, folder, name)) damaged.push_back(name);
     }
   }
   return damaged;

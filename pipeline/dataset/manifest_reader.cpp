@@ -5,6 +5,8 @@
 #include <stdexcept>
 
 #include "manifests/dataset_document.h"
+#include "manifests/file_name.h"
+#include "manifests/json_number.h"
 #include "manifests/shard.h"
 #include "pipeline/dataset/dataset_manifest.h"
 
@@ -13,23 +15,37 @@ namespace {
 
 namespace fs = std::filesystem;
 using json = nlohmann::ordered_json;
+using manifests::whole_number;
 
 std::string text_of(const json& value) {
   return value.is_null() ? std::string() : value.get<std::string>();
 }
 
+// A text that becomes a part of a folder's name: the dataset's name, or a stage's key. A stranger who makes a
+// dataset.json must not be able to choose another folder by it.
+std::string name_of(const char* what, std::string text) {
+  if (manifests::is_file_name(text)) return text;
+  throw std::runtime_error(fmt::format(
+      "{} is {}, expected a name without '/', '\\\\', ':' and control characters", what, json(text).dump()));
+}
+
+// Null where there is no such stage.
+std::string key_of_stage(const json& keys, const char* stage) {
+  const std::string key = text_of(keys.at(stage));
+  return key.empty() ? key : name_of(stage, key);
+}
+
 Counts counts_of(const json& counts) {
-  return {counts.at("candidates").get<std::int64_t>(), counts.at("retained").get<std::int64_t>(),
-          counts.at("refined").get<std::int64_t>(), counts.at("discarded").get<std::int64_t>(),
-          counts.at("failed").get<std::int64_t>()};
+  return {whole_number(counts.at("candidates")), whole_number(counts.at("retained")),
+          whole_number(counts.at("refined")), whole_number(counts.at("discarded")),
+          whole_number(counts.at("failed"))};
 }
 
 // Counts by the names of enumerators.
 template <typename Enum>
 std::map<Enum, std::int64_t> tally_of(const json& object, Enum (*from_string)(std::string_view)) {
   std::map<Enum, std::int64_t> tally;
-  for (const auto& [name, count] : object.items())
-    tally[from_string(name)] = count.template get<std::int64_t>();
+  for (const auto& [name, count] : object.items()) tally[from_string(name)] = whole_number(count);
   return tally;
 }
 
@@ -88,9 +104,12 @@ void read_config(const json& config, DatasetManifest& manifest) {
         config::role_from_string(dataset.value("role", std::string(config::to_string(config::Role::pseudo))));
   }
   if (config.contains("shards")) {
-    manifest.unit_size = config.at("shards").value("unit_size", manifest.unit_size);
+    const json& shards = config.at("shards");
+    if (shards.contains("unit_size")) {
+      constexpr std::int64_t kMost = 1 << 30;
+      manifest.unit_size = static_cast<std::size_t>(whole_number(shards.at("unit_size"), 1, kMost));
+    }
   }
-  if (manifest.unit_size == 0) throw std::runtime_error("provenance.config.shards.unit_size is 0");
 }
 
 void read_provenance(const json& provenance, DatasetManifest& manifest) {
@@ -99,13 +118,13 @@ void read_provenance(const json& provenance, DatasetManifest& manifest) {
   manifest.smal_asset_sha256 = text_of(provenance.at("smal_asset_sha256"));
   manifest.device = text_of(provenance.at("device"));
   const json& keys = provenance.at("stage_keys");
-  manifest.keys.ingest = text_of(keys.at("ingest"));
-  manifest.keys.predict = text_of(keys.at("predict"));
-  manifest.keys.fidelity = text_of(keys.at("fidelity"));
-  manifest.keys.refine = text_of(keys.at("refine"));
-  manifest.keys.measure = text_of(keys.at("measure"));
-  if (keys.contains("crops")) manifest.keys.crops = text_of(keys.at("crops"));  // 0.1.0 had no such stage
-  manifest.keys.shards = text_of(keys.at("shards"));
+  manifest.keys.ingest = key_of_stage(keys, "ingest");
+  manifest.keys.predict = key_of_stage(keys, "predict");
+  manifest.keys.fidelity = key_of_stage(keys, "fidelity");
+  manifest.keys.refine = key_of_stage(keys, "refine");
+  manifest.keys.measure = key_of_stage(keys, "measure");
+  if (keys.contains("crops")) manifest.keys.crops = key_of_stage(keys, "crops");  // 0.1.0 had no such stage
+  manifest.keys.shards = key_of_stage(keys, "shards");
   manifest.keys.dataset = manifest.key;
 }
 
@@ -116,15 +135,16 @@ DatasetManifest manifest_of(const json& document) {
   }
   DatasetManifest manifest;
   manifest.toolkit = document.value("toolkit", "?");
-  manifest.schema = document.at("schema").get<int>();
-  if (manifest.schema < 1 || manifest.schema > manifests::kShardSchema) {
+  const json& schema = document.at("schema");
+  if (!schema.is_number_integer() || schema < 1 || schema > manifests::kShardSchema) {
     throw std::runtime_error(
         fmt::format("schema is {}, this toolkit reads 1 to {}; use the toolkit version that wrote it ({})",
-                    manifest.schema, manifests::kShardSchema, manifest.toolkit));
+                    schema.dump(), manifests::kShardSchema, manifest.toolkit));
   }
-  manifest.name = document.at("name").get<std::string>();
+  manifest.schema = schema.get<int>();
+  manifest.name = name_of("name", document.at("name").get<std::string>());
   manifest.version = document.at("version").get<std::string>();
-  manifest.key = document.at("key").get<std::string>();
+  manifest.key = name_of("key", document.at("key").get<std::string>());
   manifest.content_id = document.at("content_id").get<std::string>();
   manifest.profile = document.at("profile").get<std::string>();
   manifest.counts = counts_of(document.at("counts"));
@@ -137,8 +157,8 @@ DatasetManifest manifest_of(const json& document) {
   read_provenance(document.at("provenance"), manifest);
   for (const json& shard : document.at("shards")) {
     manifest.shards.push_back({manifests::shard_name(shard.at("file")), shard.at("sha256").get<std::string>(),
-                               shard.at("bytes").get<std::int64_t>(), shard.at("rows").get<std::int64_t>(),
-                               shard.at("unit").get<std::int64_t>()});
+                               whole_number(shard.at("bytes")), whole_number(shard.at("rows")),
+                               whole_number(shard.at("unit"))});
   }
   return manifest;
 }

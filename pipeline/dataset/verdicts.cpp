@@ -1,5 +1,7 @@
 #include "pipeline/dataset/verdicts.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -8,6 +10,12 @@
 #include "manifests/enumerators.h"
 
 namespace q3d::pipeline::dataset {
+namespace {
+
+constexpr double kMostExact = 0x1.0p53;  // the doubles up to here hold every whole number
+constexpr double kMostSteps = std::numeric_limits<int>::max();
+
+}  // namespace
 
 bool VerdictRow::is_judged() const {
   return !std::isnan(judgement.initial_error);
@@ -53,11 +61,11 @@ std::optional<VerdictRow> VerdictReader::next() {
   }
 }
 
-std::optional<std::int64_t> VerdictReader::whole(std::size_t column) const {
+std::optional<std::int64_t> VerdictReader::whole(std::size_t column, double most) const {
   const std::optional<double> number = table_.number(column);
   if (!number) return std::nullopt;
-  if (!(*number >= 0.0 && *number < 0x1.0p53 && std::floor(*number) == *number)) {
-    table_.fail("\"" + table_.cell(column) + "\"", "a whole number, 0 or more");
+  if (!(*number >= 0.0 && *number <= most && std::floor(*number) == *number)) {
+    table_.fail("\"" + table_.cell(column) + "\"", fmt::format("a whole number from 0 to {}", most));
   }
   return static_cast<std::int64_t>(*number);
 }
@@ -73,8 +81,8 @@ VerdictRow VerdictReader::parse() const {
   row.judgement.initial_error = table_.number(at_.initial_error).value_or(kNaN);
   row.judgement.final_error = table_.number(at_.final_error).value_or(kNaN);
   row.judgement.gain = table_.number(at_.gain).value_or(kNaN);
-  row.judgement.iterations = static_cast<int>(whole(at_.iterations).value_or(0));
-  row.judgement.best_iteration = static_cast<int>(whole(at_.best_iteration).value_or(0));
+  row.judgement.iterations = static_cast<int>(whole(at_.iterations, kMostSteps).value_or(0));
+  row.judgement.best_iteration = static_cast<int>(whole(at_.best_iteration, kMostSteps).value_or(0));
   for (std::size_t i = 0; i < at_.trust.size(); ++i) {
     if (!at_.trust[i]) continue;
     row.judgement.trust.*manifests::kTrustColumns[i].score = table_.number(*at_.trust[i]).value_or(kNaN);
@@ -85,8 +93,8 @@ VerdictRow VerdictReader::parse() const {
   row.species = table_.cell(at_.species);
   row.family = manifests::family_from_string(table_.cell(at_.family));
   row.image_sha256 = table_.cell(at_.image_sha256);
-  const auto shard = whole(at_.shard);
-  const auto place = whole(at_.row);
+  const auto shard = whole(at_.shard, kMostExact);
+  const auto place = whole(at_.row, kMostExact);
   if (shard && place) row.label = VerdictRow::LabelPlace{*shard, *place};
 
   const bool is_kept = manifests::is_kept(row.judgement.verdict);

@@ -54,7 +54,7 @@ class VerdictReader {
         trust{};  // absent before schema 2
   };
   static Columns find_columns(const manifests::CsvTableReader& table);
-  std::optional<std::int64_t> whole(std::size_t column) const;
+  std::optional<std::int64_t> whole(std::size_t column, double most) const;
   VerdictRow parse() const;
 
   std::string text_;

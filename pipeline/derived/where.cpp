@@ -145,6 +145,12 @@ class Parser {
   }
 
   Condition not_part() {
+    // Parsing and asking recurse, so a text must not be able to choose how deep.
+    constexpr int kMostParts = 1000;
+    if (++parts_ > kMostParts) {
+      throw run::ConfigError(fmt::format(
+          "--where: got more than {} conditions, \"not\" and brackets, expected at most that", kMostParts));
+    }
     if (take("not")) {
       return [inner = not_part()](const WhereRow& row) { return !inner(row); };
     }
@@ -221,6 +227,7 @@ class Parser {
   std::string text_;
   std::vector<Token> tokens_;
   std::size_t next_ = 0;
+  int parts_ = 0;  // that were begun
 };
 
 }  // namespace

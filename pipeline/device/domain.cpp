@@ -3,12 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string_view>
 
 #include "manifests/enum_names.h"
+#include "manifests/json_number.h"
 #include "manifests/json_parse.h"
 
 namespace q3d::pipeline::device {
@@ -22,7 +24,12 @@ constexpr manifests::EnumNames kPictures("kind of pictures", Pictures::unknown, 
 std::vector<ErrorQuantile> quantiles_from(const json& l_proj) {
   std::vector<ErrorQuantile> quantiles;
   for (const auto& [share, error] : l_proj.items()) {
-    quantiles.push_back({std::stod(share), error.get<double>()});
+    double number = 0.0;
+    const auto [end, problem] = std::from_chars(share.data(), share.data() + share.size(), number);
+    if (problem != std::errc() || end != share.data() + share.size()) {
+      throw std::runtime_error(fmt::format("l_proj: got the share \"{}\", expected a number", share));
+    }
+    quantiles.push_back({number, error.get<double>()});
   }
   std::sort(quantiles.begin(), quantiles.end(),
             [](const ErrorQuantile& a, const ErrorQuantile& b) { return a.share < b.share; });
@@ -65,7 +72,7 @@ NetworkDomain domain_from_json(const std::string& text) {
     if (!document.contains("held_out")) return domain;
     const json& held_out = document.at("held_out");
     domain.held_out = held_out.at("what").get<std::string>();
-    domain.held_out_pictures = held_out.at("pictures").get<std::int64_t>();
+    domain.held_out_pictures = manifests::whole_number(held_out.at("pictures"));
     domain.quantiles = quantiles_from(held_out.at("l_proj"));
     return domain;
   } catch (const std::exception& error) {

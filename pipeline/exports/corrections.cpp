@@ -64,6 +64,30 @@ std::vector<std::size_t> order_of(const CocoFile& file) {
   fail(file.path, "categories: got none that names its keypoints, expected the 26 of the export");
 }
 
+std::int64_t id_of(const CocoFile& file, const char* place, const json& id) {
+  if (id.is_number_integer()) return id.get<std::int64_t>();
+  fail(file.path, fmt::format("{}: got {}, expected a whole number", place, id.dump()));
+}
+
+// Sample ids become lines of lists, whose parts are separated by tabs.
+std::string sample_id_of(const CocoFile& file, const json& id) {
+  auto text = id.get<std::string>();
+  if (std::none_of(text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }))
+    return text;
+  fail(file.path, fmt::format("images: quadruped3d: id: got {}, expected a text of one line", id.dump()));
+}
+
+// Throws as `fail` if it has no inverse.
+loaders::pictures::Affine affine_of(const CocoFile& file, const json& numbers) {
+  const auto affine = numbers.get<loaders::pictures::Affine>();
+  try {
+    loaders::pictures::invert(affine);
+    return affine;
+  } catch (const std::invalid_argument& error) {
+    fail(file.path, fmt::format("images: quadruped3d: picture_from_image: {}", error.what()));
+  }
+}
+
 void index_pictures(CocoFile& file) {
   std::map<std::int64_t, Picture*> by_id;
   for (const json& image : manifests::array_of(file.document, "images", file.path)) {
@@ -74,13 +98,13 @@ void index_pictures(CocoFile& file) {
                                   "(export with pictures)",
                                   name));
     }
-    by_id[image.at("id").get<std::int64_t>()] = &at->second;
+    by_id[id_of(file, "images: id", image.at("id"))] = &at->second;
     if (!image.contains("quadruped3d")) continue;
-    at->second.id = image.at("quadruped3d").at("id").get<std::string>();
-    at->second.from_image = image.at("quadruped3d").at("picture_from_image").get<loaders::pictures::Affine>();
+    at->second.id = sample_id_of(file, image.at("quadruped3d").at("id"));
+    at->second.from_image = affine_of(file, image.at("quadruped3d").at("picture_from_image"));
   }
   for (const json& annotation : manifests::array_of(file.document, "annotations", file.path)) {
-    const auto found = by_id.find(annotation.at("image_id").get<std::int64_t>());
+    const auto found = by_id.find(id_of(file, "annotations: image_id", annotation.at("image_id")));
     if (found == by_id.end()) {
       fail(file.path, fmt::format("annotations: got image_id {}, expected an id of `images`",
                                   annotation.at("image_id").dump()));
@@ -110,11 +134,11 @@ Points points_of(const CocoFile& file, const json& annotation) {
   Points points;
   for (std::size_t k = 0; k < kKeypoints; ++k) {
     const double* at = &numbers[3 * file.order[k]];
-    points[k] = {at[0], at[1], static_cast<int>(at[2])};
     if (!(at[2] == 0.0 || at[2] == 1.0 || at[2] == 2.0)) {
       fail(file.path, fmt::format("annotation {}: got v = {}, expected 0, 1 or 2",
                                   annotation.value("id", json()).dump(), at[2]));
     }
+    points[k] = {at[0], at[1], static_cast<int>(at[2])};
   }
   return points;
 }
@@ -132,12 +156,17 @@ bool has_changed(const Point& before, const Point& after) {
          (std::abs(before.x - after.x) > kUnmovedPx || std::abs(before.y - after.y) > kUnmovedPx);
 }
 
+// Throws std::out_of_range if a point lies nowhere in the source picture's plane.
 std::vector<candidates::CorrectedPoint> changed_points(const Points& before, const Points& after,
                                                        const loaders::pictures::Affine& image_from_picture) {
   std::vector<candidates::CorrectedPoint> changed;
   for (std::size_t k = 0; k < kKeypoints; ++k) {
     if (!has_changed(before[k], after[k])) continue;
     const auto at = loaders::pictures::map_point(image_from_picture, {after[k].x, after[k].y});
+    if (after[k].v > 0 && !(std::isfinite(at.x) && std::isfinite(at.y))) {
+      throw std::out_of_range(
+          fmt::format("got a keypoint at ({}, {}), expected one near the picture", after[k].x, after[k].y));
+    }
     changed.push_back({k, after[k].v > 0 ? at.x : 0.0, after[k].v > 0 ? at.y : 0.0, after[k].v});
   }
   return changed;
@@ -178,6 +207,8 @@ CocoChanges coco_changes(const fs::path& export_folder, const fs::path& correcte
                                    loaders::pictures::invert(exported.from_image));
       if (!points.empty()) changes.points[exported.id] = std::move(points);
     } catch (const json::exception& error) {
+      fail(corrected, fmt::format("{}: {}", name, error.what()));
+    } catch (const std::out_of_range& error) {
       fail(corrected, fmt::format("{}: {}", name, error.what()));
     }
   }

@@ -8,6 +8,7 @@
 #include "manifests/atomic_file.h"
 #include "manifests/digest.h"
 #include "manifests/file_descriptor.h"
+#include "manifests/file_name.h"
 #include "manifests/json_parse.h"
 #include "pipeline/run/errors.h"
 
@@ -49,9 +50,20 @@ ordered_json list_of(const ExportFolder::Files& files) {
   return list;
 }
 
+// The manifest may be a stranger's. Throws json::exception if it has another form.
 void check_files(const fs::path& out, const ordered_json& list, const fs::path& manifest) {
+  if (!list.is_array()) {
+    throw std::runtime_error(fmt::format("{}: got {}, expected a list of files; remove {} and export again",
+                                         manifest.string(), list.type_name(), out.string()));
+  }
   for (const ordered_json& entry : list) {
-    const fs::path path = out / entry.at("file").get<std::string>();
+    const auto name = entry.at("file").get<std::string>();
+    if (!manifests::leads_below(name)) {
+      throw std::runtime_error(
+          fmt::format("{}: lists {}, expected a file below its folder; remove {} and export again",
+                      manifest.string(), ordered_json(name).dump(), out.string()));
+    }
+    const fs::path path = out / name;
     if (fs::exists(path) && manifests::sha256_file(path) == entry.at("sha256").get<std::string>()) continue;
     throw std::runtime_error(fmt::format("{}: is gone or differs from {}; remove {} and export again",
                                          path.string(), manifest.string(), out.string()));
@@ -80,6 +92,11 @@ ExportFolder::ExportFolder(fs::path out, ordered_json about)
 }
 
 void ExportFolder::check_same(const ordered_json& found, const fs::path& file) const {
+  if (!found.is_object()) {
+    throw std::runtime_error(fmt::format(
+        "{}: got no JSON object, expected what an export writes; remove its folder and export again",
+        file.string()));
+  }
   for (const auto& [key, value] : about_.items()) {
     const auto at = found.find(key);
     if (at != found.end() && *at == value) continue;
@@ -94,8 +111,13 @@ bool ExportFolder::open_complete() {
   if (!fs::exists(file)) return false;
   manifest_ = read_json(file);
   check_same(manifest_, file);
-  check_files(out_, manifest_.at("files"), file);
-  check_files(out_, manifest_.at("picture_files"), file);
+  try {
+    check_files(out_, manifest_.at("files"), file);
+    check_files(out_, manifest_.at("picture_files"), file);
+  } catch (const ordered_json::exception& error) {
+    throw std::runtime_error(fmt::format("{}: not what an export writes: {}; remove {} and export again",
+                                         file.string(), error.what(), out_.string()));
+  }
   return true;
 }
 

@@ -46,13 +46,19 @@ std::string key_of(const dataset::PublishedDataset& dataset, const ReportOptions
                                     std::string(page_explorer()) + std::string(page_further_charts()))));
 }
 
+// Whether an object has this text as a member. A damaged file may have a value of another type there.
+bool says(const ordered_json& object, const char* member, const std::string& text) {
+  return object.is_object() && object.value(member, ordered_json()) == text;
+}
+
 bool is_up_to_date(const fs::path& folder, const std::string& key) {
   const std::string text = text_of_file(folder / kManifest);
   const ordered_json manifest = manifests::parse_json_or_null<ordered_json>(text);
-  if (!manifest.is_object() || manifest.value("key", "") != key || !manifest.contains("files")) return false;
+  if (!says(manifest, "key", key)) return false;
+  const ordered_json files = manifest.value("files", ordered_json());
   for (const char* name : {kStatistics, kPage}) {
     const fs::path file = folder / name;
-    if (!fs::exists(file) || manifests::sha256_file(file) != manifest["files"].value(name, "")) return false;
+    if (!fs::exists(file) || !says(files, name, manifests::sha256_file(file))) return false;
   }
   return true;
 }
@@ -62,7 +68,7 @@ ordered_json tsne_of(const std::string& text, const dataset::DatasetManifest& ma
                      const fs::path& file) {
   if (text.empty()) return nullptr;
   ordered_json tsne = manifests::parse_json_or_null<ordered_json>(text);
-  if (tsne.is_object() && tsne.value("content_id", "") == manifest.content_id) return tsne;
+  if (says(tsne, "content_id", manifest.content_id)) return tsne;
   run::log_warning(
       fmt::format("{}: it is not of this dataset ({}) and is not shown; tools/shape_tsne.py makes it again",
                   file.string(), manifest.content_id.substr(0, 16)));

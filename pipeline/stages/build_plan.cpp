@@ -6,9 +6,12 @@
 
 #include <algorithm>
 #include <optional>
+#include <stdexcept>
 #include <utility>
 
 #include "manifests/atomic_file.h"
+#include "manifests/file_name.h"
+#include "manifests/json_number.h"
 #include "manifests/sealed_json.h"
 #include "pipeline/run/log.h"
 #include "pipeline/stages/made_from.h"
@@ -50,18 +53,26 @@ std::string text_of(const BuildPlan& plan) {
   return manifests::seal_json(document);
 }
 
-// Throws json::exception when something is missing or of another type.
+// Names and keys become parts of paths.
+std::string name_in(const json& value) {
+  auto name = value.get<std::string>();
+  if (manifests::is_file_name(name)) return name;
+  throw std::runtime_error(fmt::format("got {}, expected a name or a key", value.dump()));
+}
+
+// Throws json::exception when something is missing or of another type, and std::runtime_error for a name or
+// a number that cannot be one.
 BuildPlan plan_from(const json& document) {
   BuildPlan plan;
-  plan.name = document.at("name").get<std::string>();
-  plan.keys.dataset = document.at("key").get<std::string>();
-  plan.candidates = document.at("candidates").get<std::int64_t>();
+  plan.name = name_in(document.at("name"));
+  plan.keys.dataset = name_in(document.at("key"));
+  plan.candidates = manifests::whole_number(document.at("candidates"));
   plan.command = document.at("command").get<std::vector<std::string>>();
   for (const Stage stage : kStages) {
     const std::string name(to_string(stage));
     const auto found = document.at("stages").find(name);
     if (found == document.at("stages").end()) continue;
-    key_of(plan.keys, stage) = found->at("key").get<std::string>();
+    key_of(plan.keys, stage) = name_in(found->at("key"));
     plan.made_from[name] = found->at("made_from").dump();
   }
   for (const json& unit : document.at("units")) {
@@ -87,6 +98,8 @@ PlanFile parse_plan(const fs::path& file, const manifests::SealedDocument& seale
   try {
     return {file, plan_from(document), {}};
   } catch (const json::exception& error) {
+    return {file, {}, error.what()};
+  } catch (const std::runtime_error& error) {
     return {file, {}, error.what()};
   }
 }

@@ -4,19 +4,28 @@
 
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <stdexcept>
 
 #include "manifests/atomic_file.h"
+#include "manifests/json_number.h"
 #include "manifests/json_parse.h"
 
 namespace q3d::pipeline::training {
 namespace {
 
-// A killed process may leave half a line, which counts as none.
+// A killed process may leave half a line, which counts as none, as does a line of anything else.
 bool is_at_or_before(const std::string& line, int phase, std::int64_t step) {
   const nlohmann::json document = manifests::parse_json_or_null<nlohmann::json>(line);
   if (!document.is_object()) return false;
-  const int line_phase = document.value("phase", 0);
-  return line_phase < phase || (line_phase == phase && document.value("step", std::int64_t{0}) <= step);
+  try {
+    const std::int64_t line_phase = manifests::whole_number(document.at("phase"));
+    return line_phase < phase ||
+           (line_phase == phase && manifests::whole_number(document.at("step")) <= step);
+  } catch (const nlohmann::json::exception&) {
+    return false;
+  } catch (const std::runtime_error&) {
+    return false;
+  }
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <cstddef>
+#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <span>
@@ -11,6 +12,7 @@
 #include <string_view>
 
 #include "manifests/digest.h"
+#include "manifests/json_number.h"
 #include "manifests/json_parse.h"
 #include "model/checkpoint.h"
 #include "pipeline/run/errors.h"
@@ -97,11 +99,12 @@ std::optional<StoredState> load_state(const std::filesystem::path& path, const s
   }
   try {
     const nlohmann::json document = manifests::parse_json<nlohmann::json>(entry(state.file, kPosition));
-    document.at("phase").get_to(state.position.phase);
-    document.at("step").get_to(state.position.step);
+    constexpr int kMost = std::numeric_limits<int>::max();
+    state.position.phase = static_cast<int>(manifests::whole_number(document.at("phase"), 0, kMost));
+    state.position.step = manifests::whole_number(document.at("step"));
     document.at("watch_mean").get_to(state.position.watch.mean);
-    document.at("watch_seen").get_to(state.position.watch.seen);
-  } catch (const nlohmann::json::exception& error) {
+    state.position.watch.seen = manifests::whole_number(document.at("watch_seen"));
+  } catch (const std::exception& error) {  // JSON's own, and whole_number's
     throw std::runtime_error(fmt::format("{}: metadata \"{}\": {}", path.string(), kPosition, error.what()));
   }
   return state;

@@ -58,13 +58,13 @@ std::optional<nlohmann::json> finished_world(const WorldOptions& options) {
   const fs::path file = options.out / "world.json";
   if (!fs::exists(file)) return std::nullopt;
   const auto found = manifests::parse_json_or_null<nlohmann::json>(manifests::read_file(file));
-  if (!found.is_object() || found.value("options", nlohmann::json()) != options_of(options)) {
-    throw std::runtime_error(
-        fmt::format("world: {} holds another world (its options: {}; wanted: {}); choose another folder or "
-                    "remove this one",
-                    options.out.string(),
-                    !found.is_object() ? "unreadable" : found.value("options", nlohmann::json()).dump(),
-                    options_of(options).dump()));
+  const bool is_whole = found.is_object() && found.contains("pictures");
+  if (!is_whole || found.value("options", nlohmann::json()) != options_of(options)) {
+    throw std::runtime_error(fmt::format(
+        "world: {} holds another world (its options: {}; wanted: {}); choose another folder or "
+        "remove this one",
+        options.out.string(), !is_whole ? "unreadable" : found.value("options", nlohmann::json()).dump(),
+        options_of(options).dump()));
   }
   return found.at("pictures");
 }

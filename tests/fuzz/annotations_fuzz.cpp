@@ -1,8 +1,10 @@
-// Annotation files in every JSON format: the same bytes go to each loader.
+// Annotation files in every JSON format, with keypoints or boxes alone, and as the labels of a sub-dataset
+// that `curate` asks: the same bytes go to each loader.
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "loaders/curation/source_labels.h"
 #include "loaders/formats/dataset.h"
 #include "manifests/record_json.h"
 #include "tests/fuzz/fuzz_input.h"
@@ -18,14 +20,15 @@ constexpr const char* kTopology = R"({"name": "mine", "keypoints": ["eye_l", "ey
   "animal3d26": {"left_eye": "eye_l", "right_eye": "eye_r", "nose": "snout"}})";
 
 // Checks what every later stage relies on.
-void check(const SampleRecord& record) {
+void check(const SampleRecord& record, bool has_keypoints, const std::string& root) {
   if (record.failure == Reason::none) {
     const auto& box = record.box;
     require(std::isfinite(box.x_px) && std::isfinite(box.y_px) && box.w_px > 0 && box.h_px > 0 &&
                 std::isfinite(box.w_px) && std::isfinite(box.h_px),
             "a usable record has a box with an area", record.id);
-    require(!record.image_path.empty(), "a usable record has a picture", record.id);
-    bool any = false;
+    require(record.image_path.starts_with(root), "a usable record has a picture below the root",
+            record.image_path);
+    bool any = !has_keypoints;
     for (const auto& point : record.keypoints) {
       if (!(point.weight > 0.0F)) continue;
       any = true;
@@ -54,8 +57,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     return true;
   }();
   require(has_pictures, "pictures are there");
+  static const std::string root = std::filesystem::canonical(scratch.root()).string() + "/";
   const auto file = scratch.write("train.json", q3d::fuzz::as_text(data, size));
-  for (const char* format : {"prima", "superanimal", "animal_kingdom", "stanfordextra", "badja", "coco"}) {
+  for (const char* format :
+       {"prima", "superanimal", "animal_kingdom", "stanfordextra", "badja", "coco", "photographs"}) {
     q3d::loaders::formats::DatasetOptions options{.name = "set",
                                                   .format = format,
                                                   .split = "train",
@@ -66,10 +71,15 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     q3d::fuzz::value_or_refusal(file, [&] {
       std::set<std::string> ids;
       for (const SampleRecord& record : load_dataset(options).records) {
-        check(record);
+        check(record, options.format != "photographs", root);
         require(ids.insert(record.id).second, "ids are unique", record.id);
       }
     });
   }
+  q3d::fuzz::value_or_refusal(file, [&] {
+    q3d::loaders::curation::SourceLabels labels;
+    labels.add(file);
+    labels.find("images/a.jpg");
+  });
   return 0;
 }

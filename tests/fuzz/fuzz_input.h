@@ -7,6 +7,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>
@@ -15,6 +16,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 
 namespace q3d::fuzz {
 
@@ -55,12 +57,32 @@ inline std::string_view as_text(const std::uint8_t* data, std::size_t size) {
   return {reinterpret_cast<const char*>(data), size};
 }
 
+// The input of a target that covers several readers: its first byte names the reader. A seed in the corpus
+// begins with that letter.
+struct Chosen {
+  char reader = 0;  // 0 for an empty input
+  std::string_view bytes;
+};
+inline Chosen chosen_reader(const std::uint8_t* data, std::size_t size) {
+  if (size == 0) return {};
+  return {static_cast<char>(data[0]), as_text(data + 1, size - 1)};
+}
+
+// Cuts an input for a reader of two files at the first record separator (0x1E). The second file is empty
+// without one.
+inline std::pair<std::string_view, std::string_view> two_files(std::string_view bytes) {
+  const std::size_t at = std::min(bytes.find('\x1e'), bytes.size());
+  return {bytes.substr(0, at), bytes.substr(std::min(at + 1, bytes.size()))};
+}
+
 // Runs `read`, which may refuse `file`: then its message must name it.
 template <typename Error = std::runtime_error, typename Read>
 void value_or_refusal(const std::filesystem::path& file, const Read& read) {
   try {
     read();
   } catch (const Error& error) {
+    // Q3D_FUZZ_REFUSALS=1 shows whether a seed is read at all.
+    if (std::getenv("Q3D_FUZZ_REFUSALS") != nullptr) std::cerr << "refused: " << error.what() << '\n';
     require(std::string_view(error.what()).find(file.filename().string()) != std::string_view::npos,
             "a refusal names the file", error.what());
   }

@@ -1,13 +1,16 @@
 """Files that were made to do harm: the program ends with a message or a verdict, in bounded memory and time."""
 
+import hashlib
 import json
 import resource
+import shutil
 import struct
 import subprocess
 import zlib
 
-from e2e import (LIMIT_S, DrawnCase, Fault, command, environment, latest, make_network, prima_dataset, run,
-                 split_safetensors, verdicts, write_annotations, write_json, write_safetensors)
+from e2e import (LIMIT_S, DrawnCase, Fault, command, environment, file_sha256, latest, make_network, prima_dataset,
+                 read_byte_column, run, seal_json, split_safetensors, verdicts, write_annotations, write_json,
+                 write_safetensors)
 
 MEGA = 1 << 20
 LEVELS = 100_000
@@ -141,6 +144,136 @@ class Hostile(DrawnCase):
             network.write_bytes(struct.pack("<Q", length) + b"{}")
             self.assertIn("tiny.safetensors", self.bounded("build", "--config", config, "--out", self.folder / "out",
                                                            expect=1))
+
+    def test_names_of_pictures_that_lead_out_of_the_root(self):
+        """However a name is spelled, the picture outside is never read."""
+        secret = self.folder / "secret.png"
+        shutil.copy(self.data / "images/p002.png", secret)
+        (self.data / "images/p002.png").unlink()
+        images = self.data / "images"
+        (images / "link.png").symlink_to(secret)
+        (images / "up").symlink_to(self.folder)
+        windows = str(secret).replace("/", "\\")
+        names = ["../secret.png", "images/../../secret.png", str(secret), "images/link.png", "images/up/secret.png",
+                 "images/p000.png\0", "../secret.png\0.png", "..\\secret.png", "images\\..\\..\\secret.png",
+                 f"C:{windows}", f"c:{secret}", f"\\\\server\\share{windows}", f"\\\\?\\C:{windows}",
+                 f"file://{secret}", "%2e%2e/secret.png", "..%2fsecret.png", "..%5csecret.png",
+                 "....//....//secret.png", "images/up/../secret.png", "\u2025/secret.png", ""]
+        records = json.loads((self.data / "train.json").read_text())["data"]
+        changes = [{"img_path": name} for name in names] + [{"mask_path": name} for name in names if name]
+        for i, change in enumerate(changes):
+            points = [[x + i / 8, y, v] for x, y, v in records[0]["keypoint_2d"]]  # else they are duplicates
+            changes[i] = {**records[0], "keypoint_2d": points, **change}
+        write_annotations(self.data, changes)
+        self.build("--set", "max_failed_share=1")
+        dataset = latest(self.folder / "out")
+        rows = verdicts(dataset)
+        self.assertNotIn(file_sha256(secret), {row["image_sha256"] for row in rows})
+        for change, row in zip(changes[: len(names)], rows):
+            self.assertEqual(row["verdict"], "failed", (change["img_path"], row))
+            self.assertIn(row["reason"], ("path_escapes_root", "image_missing", "record_malformed"), row)
+        self.assertEqual(set(read_byte_column(dataset, "crop_mask")), {b""})
+
+    def stranger(self, name, change):
+        """A copy of the finished dataset with a change of dataset.json, whose digest is right."""
+        folder = shutil.copytree(latest(self.shared / "out"), self.folder / name / "drawn-000000000000")
+        file = folder / "dataset.json"
+        document = json.loads(file.read_text())
+        change(document)
+        file.chmod(0o644)
+        file.write_text(seal_json(document))
+        return folder
+
+    def files(self):
+        return {path for path in self.folder.rglob("*")}
+
+    def test_names_in_dataset_json_that_lead_elsewhere(self):
+        def named(name):
+            return lambda document: document.update(name=name)
+
+        def shard(name):
+            return lambda document: document["shards"][0].update(file=name)
+
+        def key(value):
+            return lambda document: document["provenance"]["stage_keys"].update(predict=value)
+
+        other = latest(self.copy_of("out"))
+        cases = [(named, name) for name in ("../escaped", "/tmp/escaped", "a/b", "..", "a\0b", "a\\b", "")]
+        cases += [(shard, name) for name in ("../x.h5", "shards/../../x.h5", "/x.h5", "shards/a\0.h5", "shards\\x.h5")]
+        cases += [(key, text) for text in ("/../../../xx", "a/b", "..")]
+        for i, (change, text) in enumerate(cases):
+            folder = self.stranger(f"s{i}", change(text))
+            before = self.files()
+            out = ["--out", self.folder / f"s{i}" / "new"]
+            commands = [["inspect", folder], ["subset", folder, "--where", "verdict = retained", *out]]
+            if text in ("../escaped", "../x.h5"):
+                commands += [["verify", folder], ["explain", folder, "p001"], ["report", folder], ["diff", folder, other],
+                             ["merge", folder, other, *out], ["export", folder, "--format", "coco", *out]]
+            for words in commands:
+                with self.subTest(change=text, command=words[0]):
+                    self.assertIn("dataset.json", self.bounded(*words, expect=1))
+            self.assertEqual(self.files() - before, set())
+
+    def test_names_in_an_export_that_lead_elsewhere(self):
+        out = self.copy_of("out")
+        run("export", out, "--format", "coco", "--out", self.folder / "coco")
+        file = self.folder / "coco/export.json"
+        manifest = json.loads(file.read_text())
+        secret = self.folder / "secret.txt"
+        secret.write_text("secret")
+        digest = hashlib.sha256(b"secret").hexdigest()
+        for name in ("../secret.txt", str(secret), "images/../../secret.txt", "a\0", "", "..", "..\\secret.txt"):
+            for part in ("files", "picture_files"):
+                file.write_text(json.dumps({**manifest, part: [{"file": name, "bytes": 6, "sha256": digest}]}))
+                message = self.bounded("export", out, "--format", "coco", "--out", self.folder / "coco", expect=1)
+                self.assertIn("export.json", message)
+                self.bounded("status", out, expect=0)
+        for text in ("[]", "{}", '{"files": 1}', json.dumps({**manifest, "files": {"a": 1}}),
+                     json.dumps({**manifest, "files": [1]}), json.dumps({**manifest, "picture_files": [{"file": 1}]})):
+            file.write_text(text)
+            result = run("export", out, "--format", "coco", "--out", self.folder / "coco", expect=None)
+            self.assertIn(result.returncode, (1, 2), text)
+            self.assertIn("export.json", result.stderr)
+            self.bounded("status", out, expect=0)
+
+    def test_files_of_earlier_runs_with_values_of_other_types(self):
+        """Each is JSON as a reader expects it, but for the type of one value."""
+        out = self.copy_of("out")
+        run("report", out)
+        folder = out / "report" / latest(out).name
+        for name in ("manifest.json", "tsne.json"):
+            for text in ("[]", '{"key": 1}', '{"content_id": 1}', '{"key": "x", "files": 3}', "1", '{"files": []}'):
+                (folder / name).write_text(text)
+                self.bounded("report", out, expect=0)
+        world = self.folder / "world"
+        world.mkdir()
+        for text in ("[]", "{}", '{"options": 1}'):
+            (world / "world.json").write_text(text)
+            self.assertIn("world", self.bounded("sample", "--out", world, "--share", 0.01, expect=1))
+
+    def test_pages_show_names_as_text(self):
+        """A picture and a species whose names are HTML."""
+        attack = "<img src=x onerror=alert(1)>"
+        records = json.loads((self.data / "train.json").read_text())["data"]
+        for i, record in enumerate(records):
+            name = f"images/p{i}{attack.replace('/', '')}&amp;\"'.png"
+            shutil.copy(self.data / record["img_path"], self.data / name)
+            record.update(img_path=name, species=f"</script>{attack}", source=attack)
+        write_annotations(self.data, records)
+        shutil.copytree(self.data, self.folder / "test set")
+        config = {**json.loads(self.config.read_text()),
+                  "leakage": {"test_sets": [prima_dataset(self.folder / "test set", name="tests", split="test")]}}
+        self.config.write_text(json.dumps(config))
+        self.build()
+        self.bounded("report", self.folder / "out", expect=0)
+        self.bounded("leakage", "--config", self.config, "--out", self.folder / "leakage", expect=0)
+        pages = list(self.folder.rglob("*.html"))
+        self.assertGreaterEqual(len(pages), 2, pages)
+        for page in pages:
+            text = page.read_text()
+            self.assertIn("onerror", text, page)  # else the page shows no names
+            self.assertNotIn("<img src=x", text, page)
+            self.assertNotIn(f"</script>{attack[:4]}", text, page)
 
     def test_a_shard_of_a_stranger(self):
         """A stranger makes dataset.json and its digests too, so that only the file's own claims can tell."""

@@ -77,5 +77,19 @@ TEST_F(Where, MistakesAreToldWithTheirPlace) {
   EXPECT_THAT(message(""), HasSubstr("got the end"));
 }
 
+TEST_F(Where, AConditionHasABoundedNumberOfParts) {
+  const auto repeated = [](const std::string& text, int times) {
+    std::string all;
+    for (int i = 0; i < times; ++i) all += text;
+    return all;
+  };
+  for (const std::string& text :
+       {repeated("(", 50'000) + "id = a" + repeated(")", 50'000), repeated("not ", 50'000) + "id = a",
+        "id = a" + repeated(" and id = a", 20'000)}) {
+    EXPECT_THROW(parse_where(text), run::ConfigError);
+  }
+  EXPECT_NO_THROW(parse_where("id = a" + repeated(" or id = b", 900)));
+}
+
 }  // namespace
 }  // namespace q3d::pipeline::derived

@@ -158,5 +158,44 @@ TEST(UnitTables, CropsSurviveTheDisk) {
   EXPECT_THROW(crops_from_table(manifests::read_table(scratch.path() / "t.h5")), std::runtime_error);
 }
 
+// A stranger's table is read too: `explain` and `overlay` take the stages of any output folder.
+TEST(UnitTables, AColumnOfAnotherShapeIsRefused) {
+  const manifests::Table predicted =
+      to_table(std::vector<candidates::Candidate>(3), std::vector<PredictedSample>(3));
+  const manifests::Table crops =
+      to_table(std::vector<EncodedCrop>{{.sample = 0}, {.sample = 1}, {.sample = 2}});
+  const auto refused = [](manifests::Table table, const std::string& column, const auto& read) {
+    table.numeric.at(column).row_shape = {};
+    auto& data = table.numeric.at(column).data;
+    data.resize(data.size() / 13);  // not of three rows, whatever a row has
+    EXPECT_THROW(read(table), std::runtime_error) << column;
+  };
+  for (const char* column : {"image_size_px", "has_mask", "rotations", "camera"}) {
+    refused(predicted, column, [](const auto& table) { return predicted_from_table(table); });
+  }
+  for (const char* column : {"box_xywh_px", "keypoints_px", "keypoint_v", "keypoint_weight"}) {
+    refused(predicted, column, [](const auto& table) { return candidate_from_table(table, 2); });
+  }
+  manifests::Table whole = crops;
+  for (const auto& [name, views] : crops.blob_views) {
+    for (const auto view : views) whole.blobs[name].emplace_back(view.begin(), view.end());
+  }
+  for (const char* column : {"sample", "side_px", "from_image"}) {
+    refused(whole, column, [](const auto& table) { return crops_from_table(table); });
+  }
+}
+
+TEST(UnitTables, ACurveOfHalfANumberIsRefused) {
+  manifests::Table table = to_table(std::vector<RefinedSample>{{.sample = 0, .curve = {0.5, 0.25}}});
+  table.blobs.at("curve").front().resize(15);
+  EXPECT_THROW(refined_from_table(table), std::runtime_error);
+}
+
+TEST(UnitTables, AReasonThatIsNoneIsRefused) {
+  manifests::Table table = to_table(std::vector<candidates::Candidate>(1), std::vector<PredictedSample>(1));
+  table.text.at("failure").front() = "no_such_reason";
+  EXPECT_THROW(predicted_from_table(table), std::runtime_error);
+}
+
 }  // namespace
 }  // namespace q3d::pipeline::unit
