@@ -8,6 +8,7 @@
 #include <random>
 #include <stdexcept>
 #include <system_error>
+#include <utility>
 
 #include "manifests/file_descriptor.h"
 
@@ -62,6 +63,34 @@ void write_file_atomically(const fs::path& path, std::span<const std::byte> cont
 
 void write_file_atomically(const fs::path& path, std::string_view content) {
   write_file_atomically(path, std::as_bytes(std::span(content)));
+}
+
+AtomicWriter::AtomicWriter(fs::path path)
+    : path_(std::move(path)),
+      temporary_(temporary_name(path_)),
+      file_(temporary_, O_WRONLY | O_CREAT | O_EXCL) {}
+
+AtomicWriter::~AtomicWriter() {
+  if (!is_committed_) ::unlink(temporary_.c_str());
+}
+
+void AtomicWriter::write(std::string_view text) {
+  constexpr std::size_t kBlock = std::size_t{1} << 18U;
+  pending_ += text;
+  if (pending_.size() >= kBlock) flush();
+}
+
+void AtomicWriter::flush() {
+  digest_.update(std::as_bytes(std::span(pending_)));
+  file_.write_all(pending_);
+  pending_.clear();
+}
+
+std::string AtomicWriter::commit() {
+  flush();
+  finish(file_, temporary_, path_);
+  is_committed_ = true;
+  return digest_.hex();
 }
 
 void commit_file(const fs::path& temporary, const fs::path& path) {

@@ -7,12 +7,40 @@
 #include <string>
 #include <string_view>
 
+#include "manifests/digest.h"
+#include "manifests/file_descriptor.h"
+
 namespace q3d::manifests {
 
 // Writes `content` to `path`. If this fails, the temporary file is removed, an older file at `path` stays as
 // it was, and IoError (manifests/file_descriptor.h) names the path and the reason (disk full, ...).
 void write_file_atomically(const std::filesystem::path& path, std::span<const std::byte> content);
 void write_file_atomically(const std::filesystem::path& path, std::string_view content);
+
+// The same for a file that is too long to lie in memory: its text comes in pieces.
+class AtomicWriter {
+ public:
+  // Makes the temporary file. Throws IoError, as all members do.
+  explicit AtomicWriter(std::filesystem::path path);
+  // Removes the temporary file unless commit() has renamed it.
+  ~AtomicWriter();
+  AtomicWriter(const AtomicWriter&) = delete;
+  AtomicWriter& operator=(const AtomicWriter&) = delete;
+
+  void write(std::string_view text);
+  // Makes the file durable and gives it its name. Returns the SHA-256 of its content. Call it once.
+  std::string commit();
+
+ private:
+  void flush();
+
+  std::filesystem::path path_;
+  std::filesystem::path temporary_;
+  FileDescriptor file_;
+  std::string pending_;
+  Sha256 digest_;
+  bool is_committed_ = false;
+};
 
 // Makes a finished temporary file durable and renames it to `path`. If this fails, the temporary file is
 // removed.

@@ -3,13 +3,45 @@
 #include <openssl/evp.h>
 
 #include <algorithm>
-#include <array>
 #include <stdexcept>
 #include <vector>
 
 #include "manifests/file_descriptor.h"
 
 namespace q3d::manifests {
+
+namespace {
+
+constexpr std::string_view kDigits = "0123456789abcdef";
+
+std::optional<std::uint8_t> value_of(char digit) {
+  const std::size_t value = kDigits.find(digit);
+  return value == std::string_view::npos ? std::nullopt : std::optional(static_cast<std::uint8_t>(value));
+}
+
+}  // namespace
+
+std::string to_hex(const DigestBytes& digest) {
+  std::string text;
+  text.reserve(2 * digest.size());
+  for (const std::uint8_t byte : digest) {
+    text += kDigits[byte >> 4U];
+    text += kDigits[byte & 15U];
+  }
+  return text;
+}
+
+std::optional<DigestBytes> digest_from_hex(std::string_view hex) {
+  DigestBytes digest{};
+  if (hex.size() != 2 * digest.size()) return std::nullopt;
+  for (std::size_t i = 0; i < digest.size(); ++i) {
+    const auto high = value_of(hex[2 * i]);
+    const auto low = value_of(hex[2 * i + 1]);
+    if (!high || !low) return std::nullopt;
+    digest[i] = static_cast<std::uint8_t>(*high << 4U | *low);
+  }
+  return digest;
+}
 
 void Sha256::Free::operator()(evp_md_ctx_st* context) const {
   EVP_MD_CTX_free(context);
@@ -28,18 +60,11 @@ void Sha256::update(std::span<const std::byte> bytes) {
 }
 
 std::string Sha256::hex() {
-  std::array<unsigned char, 32> digest{};
+  DigestBytes digest{};
   if (EVP_DigestFinal_ex(context_.get(), digest.data(), nullptr) != 1) {
     throw std::runtime_error("OpenSSL failed to digest");
   }
-  constexpr std::string_view kDigits = "0123456789abcdef";
-  std::string text;
-  text.reserve(2 * digest.size());
-  for (const unsigned char byte : digest) {
-    text += kDigits[byte >> 4];
-    text += kDigits[byte & 15];
-  }
-  return text;
+  return to_hex(digest);
 }
 
 std::string sha256(std::span<const std::byte> bytes) {

@@ -1,10 +1,11 @@
 // SHA-256 digests of bytes and files, and a cache that avoids reading unchanged files again.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <filesystem>
-#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -12,12 +13,19 @@
 #include <string>
 #include <string_view>
 
+#include "manifests/path_table.h"
+
 struct evp_md_ctx_st;  // OpenSSL's EVP_MD_CTX
 
 namespace q3d::manifests {
 
 std::string sha256(std::span<const std::byte> bytes);  // 64 lower-case hex digits
 std::string sha256(std::string_view text);
+// A digest in half the space of its digits.
+using DigestBytes = std::array<std::uint8_t, 32>;
+std::string to_hex(const DigestBytes& digest);
+std::optional<DigestBytes> digest_from_hex(std::string_view hex);  // nothing if it is no such text
+
 // Reads the file in blocks. Throws IoError (manifests/file_descriptor.h) when it cannot be read.
 std::string sha256_file(const std::filesystem::path& path);
 
@@ -48,19 +56,24 @@ class DigestCache {
   // Returns nothing if there is no such file. Throws IoError if there is one that cannot be read, which says
   // nothing about its content.
   std::optional<std::string> digest_if_present(const std::filesystem::path& path);
-  // Writes one checked line for each entry, sorted by path, atomically. Throws std::runtime_error.
+  // Writes one checked line for each entry, sorted by path, atomically, unless the file holds them already.
+  // Throws std::runtime_error.
   void save() const;
 
  private:
   struct Entry {
     std::uint64_t size = 0;
     std::int64_t mtime_ns = 0;
-    std::uint64_t inode = 0;
-    std::string sha256;
+    std::uint64_t inode = 0;  // 0: nothing is remembered
+    DigestBytes sha256{};
   };
+  void remember(std::string_view path, const Entry& entry);
+
   std::filesystem::path file_;
-  mutable std::mutex mutex_;
-  std::map<std::string, Entry> entries_;
+  mutable std::mutex mutex_;  // guards what follows
+  PathTable paths_;
+  std::deque<Entry> entries_;      // by the path's number
+  mutable bool is_saved_ = false;  // the file holds all of it and nothing else
 };
 
 }  // namespace q3d::manifests

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "manifests/atomic_file.h"
+#include "manifests/block_reader.h"
 #include "manifests/checked_line.h"
 #include "manifests/digest.h"
 #include "manifests/file_descriptor.h"
@@ -41,59 +42,80 @@ bool parse(std::string_view text, Integer& value) {
   return error == std::errc() && end == text.data() + text.size();
 }
 
-// One line of the cache's file.
+// One line of the cache's file. The path is a part of the line.
 struct CachedDigest {
-  std::string sha256;
+  DigestBytes sha256{};
   FileState state;
-  std::string path;
+  std::string_view path;
 };
 
-// Calls `take` for every sound line of the file; none if there is no such file.
+// Calls `take` for every sound line of the file. Returns whether there is such a file and all its lines are
+// sound.
 template <typename Take>
-void read_cached(const std::filesystem::path& file, Take&& take) {
-  if (!std::filesystem::exists(file)) return;
-  const std::string content = read_file(file);
-  std::string_view rest = content;
-  while (!rest.empty()) {
-    const auto payload = open_line(next_field(rest, '\n'));
-    if (!payload) continue;
+bool read_cached(const std::filesystem::path& file, Take&& take) {
+  if (!std::filesystem::exists(file)) return false;
+  bool is_sound = true;
+  LineReader lines(file);
+  while (const auto text = lines.next()) {
+    const auto payload = open_line(*text);
+    if (!payload) {
+      is_sound = false;
+      continue;
+    }
     std::string_view fields = *payload;
     CachedDigest line;
-    line.sha256 = next_field(fields, ' ');
-    if (line.sha256.size() == 64 && parse(next_field(fields, ' '), line.state.size) &&
+    const auto sha256 = digest_from_hex(next_field(fields, ' '));
+    if (sha256 && parse(next_field(fields, ' '), line.state.size) &&
         parse(next_field(fields, ' '), line.state.mtime_ns) &&
         parse(next_field(fields, ' '), line.state.inode) && !fields.empty()) {
+      line.sha256 = *sha256;
       line.path = fields;
-      take(std::move(line));
+      take(line);
+    } else {
+      is_sound = false;
     }
   }
+  return is_sound;
+}
+
+// The path as it is remembered: absolute, and without detours. Most are so already.
+std::string key_of(const std::filesystem::path& path) {
+  const std::string& text = path.native();
+  const bool has_detours = text.find("//") != std::string::npos || text.find("/.") != std::string::npos;
+  if (text.starts_with('/') && !has_detours) return text;
+  return std::filesystem::absolute(path).lexically_normal().string();
 }
 
 }  // namespace
 
 DigestCache::DigestCache(std::filesystem::path file) : file_(std::move(file)) {
-  read_cached(file_, [this](CachedDigest line) {
-    entries_.insert_or_assign(std::move(line.path), Entry{line.state.size, line.state.mtime_ns,
-                                                          line.state.inode, std::move(line.sha256)});
+  is_saved_ = read_cached(file_, [this](const CachedDigest& line) {
+    remember(line.path, {line.state.size, line.state.mtime_ns, line.state.inode, line.sha256});
   });
 }
 
 std::multimap<std::string, std::filesystem::path> read_known_files(const std::filesystem::path& digests) {
   std::multimap<std::string, std::filesystem::path> files;
-  read_cached(digests,
-              [&](CachedDigest line) { files.emplace(std::move(line.sha256), std::move(line.path)); });
+  read_cached(digests, [&](const CachedDigest& line) { files.emplace(to_hex(line.sha256), line.path); });
   return files;
 }
 
+void DigestCache::remember(std::string_view path, const Entry& entry) {
+  const auto [number, is_new] = paths_.add(path);
+  if (is_new) entries_.emplace_back();
+  entries_[number] = entry;
+}
+
 std::string DigestCache::digest(const std::filesystem::path& path) {
-  const std::string key = std::filesystem::absolute(path).lexically_normal().string();
+  const std::string key = key_of(path);
   const FileState before = state_of(path);
   {
     const std::lock_guard lock(mutex_);
-    const auto found = entries_.find(key);
-    if (found != entries_.end()) {
-      const Entry& entry = found->second;
-      if (FileState{entry.size, entry.mtime_ns, entry.inode} == before) return entry.sha256;
+    if (const auto number = paths_.find(key)) {
+      const Entry& entry = entries_[*number];
+      if (entry.inode != 0 && FileState{entry.size, entry.mtime_ns, entry.inode} == before) {
+        return to_hex(entry.sha256);
+      }
     }
   }
   const std::int64_t started_ns = now_ns();
@@ -102,9 +124,11 @@ std::string DigestCache::digest(const std::filesystem::path& path) {
   const bool fits_a_line = key.find('\n') == std::string::npos;
   const std::lock_guard lock(mutex_);
   if (settled && fits_a_line) {
-    entries_.insert_or_assign(key, Entry{before.size, before.mtime_ns, before.inode, digest});
-  } else {
-    entries_.erase(key);
+    remember(key, {before.size, before.mtime_ns, before.inode, digest_from_hex(digest).value()});
+    is_saved_ = false;
+  } else if (const auto number = paths_.find(key)) {
+    entries_[*number] = {};
+    is_saved_ = false;
   }
   return digest;
 }
@@ -119,15 +143,17 @@ std::optional<std::string> DigestCache::digest_if_present(const std::filesystem:
 }
 
 void DigestCache::save() const {
-  std::string content;
-  {
-    const std::lock_guard lock(mutex_);
-    for (const auto& [path, entry] : entries_) {
-      content += seal_line(
-          fmt::format("{} {} {} {} {}", entry.sha256, entry.size, entry.mtime_ns, entry.inode, path));
-    }
+  const std::lock_guard lock(mutex_);
+  if (is_saved_) return;
+  AtomicWriter file(file_);
+  for (const std::uint32_t number : paths_.sorted()) {
+    const Entry& entry = entries_[number];
+    if (entry.inode == 0) continue;
+    file.write(seal_line(fmt::format("{} {} {} {} {}", to_hex(entry.sha256), entry.size, entry.mtime_ns,
+                                     entry.inode, paths_.path(number))));
   }
-  write_file_atomically(file_, content);
+  file.commit();
+  is_saved_ = true;
 }
 
 }  // namespace q3d::manifests

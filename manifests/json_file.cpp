@@ -3,53 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
-#include <cstdlib>
 #include <stdexcept>
 #include <string_view>
 
+#include "manifests/json_mask.h"
 #include "manifests/json_parse.h"
 #include "manifests/text_file.h"
 
 namespace q3d::manifests {
 namespace {
-
-bool is_token_char(char c) {
-  return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '-' || c == '+' ||
-         c == '.';
-}
-
-// Returns whether a bare word is a number that JSON cannot hold. Most words are short plain numbers, so the
-// cheap tests come first.
-bool is_no_json_number(std::string_view word) {
-  if (word == "NaN" || word == "Infinity" || word == "-Infinity") return true;
-  const bool is_number = word[0] == '-' || (word[0] >= '0' && word[0] <= '9');
-  const bool may_overflow = word.size() > 300 || word.find_first_of("eE") != std::string_view::npos;
-  return is_number && may_overflow && std::isinf(std::strtod(std::string(word).c_str(), nullptr));
-}
-
-// Turns numbers that JSON cannot hold into texts of tildes of the same length, so that the rest of the file
-// stays readable and byte positions stay true. describe() and the readers know these texts.
-void mask_numbers_beyond_json(std::string& text) {
-  bool in_string = false;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    if (in_string && text[i] == '\\') {
-      ++i;
-    } else if (text[i] == '"') {
-      in_string = !in_string;
-    } else if (!in_string && is_token_char(text[i])) {
-      std::size_t end = i;
-      while (end < text.size() && is_token_char(text[end])) ++end;
-      const std::string_view word = std::string_view(text).substr(i, end - i);
-      if (word.size() > 2 && is_no_json_number(word)) {
-        std::fill(text.begin() + static_cast<std::ptrdiff_t>(i),
-                  text.begin() + static_cast<std::ptrdiff_t>(end), '~');
-        text[i] = text[end - 1] = '"';
-      }
-      i = end - 1;
-    }
-  }
-}
 
 // Whether a line is "key:" or "key: value", with which YAML files begin.
 bool is_yaml(std::string_view line) {
@@ -90,7 +52,7 @@ std::string hint(std::string_view text, std::string_view reason) {
 
 nlohmann::json read_json_file(const std::filesystem::path& file) {
   std::string text = read_text_file(file, "an annotation file in JSON");
-  mask_numbers_beyond_json(text);
+  JsonMask().apply(text, 0, true);
   try {
     return parse_json<nlohmann::json>(text);
   } catch (const TooDeep& error) {

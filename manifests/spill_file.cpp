@@ -1,0 +1,42 @@
+#include "manifests/spill_file.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <random>
+
+namespace q3d::manifests {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Not every file system has files without a name. A file whose name is removed at once is the same, but a
+// kill in between leaves it; its suffix is that of what remove_temporaries() removes.
+FileDescriptor nameless(const fs::path& folder) {
+  try {
+    return {folder.empty() ? fs::path(".") : folder, O_TMPFILE | O_RDWR};
+  } catch (const IoError& error) {
+    if (error.code() != EOPNOTSUPP && error.code() != EISDIR && error.code() != EINVAL) throw;
+  }
+  static std::atomic<unsigned> counter{0};
+  static const unsigned machine = std::random_device{}();
+  const fs::path name = folder / fmt::format("spill.{}.{:08x}.{}.tmp", ::getpid(), machine, counter++);
+  FileDescriptor file(name, O_RDWR | O_CREAT | O_EXCL);
+  if (::unlink(name.c_str()) != 0) throw_errno("remove", name);
+  return file;
+}
+
+}  // namespace
+
+SpillFile::SpillFile(const fs::path& folder) : file_(nameless(folder)) {}
+
+std::uint64_t SpillFile::append(std::span<const std::byte> bytes) {
+  const std::uint64_t offset = size_;
+  file_.write_all(bytes);
+  size_ += bytes.size();
+  return offset;
+}
+
+}  // namespace q3d::manifests

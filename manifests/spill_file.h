@@ -1,0 +1,31 @@
+// Holds on disk what a run needs again and does not keep in memory.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <span>
+
+#include "manifests/file_descriptor.h"
+
+namespace q3d::manifests {
+
+// A file without a name: it goes when it is closed, and when the process ends in any way. What was appended
+// may be read from many threads; appending needs a thread of its own.
+class SpillFile {
+ public:
+  // The file lies in `folder`, which must be there. Throws IoError.
+  explicit SpillFile(const std::filesystem::path& folder);
+
+  // Returns where the bytes begin. Throws IoError (disk full, ...).
+  std::uint64_t append(std::span<const std::byte> bytes);
+  // Throws IoError.
+  void read(std::uint64_t offset, std::span<std::byte> bytes) const { file_.read_at(offset, bytes); }
+  std::uint64_t size() const { return size_; }
+
+ private:
+  FileDescriptor file_;
+  std::uint64_t size_ = 0;
+};
+
+}  // namespace q3d::manifests
