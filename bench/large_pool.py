@@ -6,7 +6,9 @@
 
 The pictures are 96 x 72 px JPEG files. A thousand different ones are linked under as many names as there are
 candidates, so that a million take little space; every candidate has keypoints of its own. `measure` builds the pool as
-`2d_only`, which needs no network, then again with nothing to do, and with a veto that removes one candidate.
+`2d_only`, which needs no network, then again with nothing to do, with a veto that removes one candidate, and under
+another name, for which every shard is written anew from the stored crops. A candidate's memory is the difference of the
+peaks of two pools, divided by the difference of their numbers of candidates.
 """
 
 import json
@@ -65,6 +67,7 @@ def make(folder, count):
                                              "annotations": "train.json", "role": "2d_only"}]}
     (folder / "config.json").write_text(json.dumps(config))
     (folder / "veto.json").write_text(json.dumps({**config, "veto": "veto.txt"}))
+    (folder / "renamed.json").write_text(json.dumps({**config, "name": "renamed"}))
     (folder / "veto.txt").write_text(f"large/train/images/{count // 2 // FOLDER_SIZE:04}/{count // 2:07}.jpg#{count // 2}\n")
 
 
@@ -83,7 +86,7 @@ def run(program, folder, what, config):
     print(json.dumps({"what": what, "candidates": summary["candidates"], "kept": summary["retained"],
                       "up_to_date": summary["up_to_date"], "seconds": round(seconds, 2),
                       "cpu_seconds": round(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, 2),
-                      "peak_mb": int(result.stderr.split()[-1]) // 1024}), flush=True)
+                      "peak_mb": round(int(result.stderr.split()[-1]) / 1024, 1)}), flush=True)
 
 
 def measure(folder, program):
@@ -91,6 +94,7 @@ def measure(folder, program):
     run(program, folder, "nothing to do", "config.json")
     run(program, folder, "one veto", "veto.json")
     run(program, folder, "nothing to do, other config", "veto.json")
+    run(program, folder, "every shard anew", "renamed.json")
 
 
 if __name__ == "__main__":

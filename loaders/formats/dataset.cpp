@@ -21,14 +21,16 @@ using manifests::Reason;
 using manifests::SampleRecord;
 
 using Parser = Dataset (*)(const DatasetOptions&);
+using PieceParser = Dataset (*)(const DatasetOptions&, const TakeRecords&);
 struct Format {
   const char* name = nullptr;
-  Parser parser = nullptr;
+  Parser parser = nullptr;  // null if there is one that reads piece by piece
   bool takes_topology = false;
+  PieceParser piece_parser = nullptr;
 };
 // SLEAP's and Lightning Pose's files are tables of the same kind as DeepLabCut's, so all three share a
 // parser.
-constexpr std::array<Format, 10> kFormats{{{"prima", load_prima},
+constexpr std::array<Format, 10> kFormats{{{"prima", nullptr, false, stream_prima},
                                            {"superanimal", load_superanimal},
                                            {"animal_kingdom", load_animal_kingdom},
                                            {"stanfordextra", load_stanford_extra},
@@ -49,6 +51,18 @@ void require_id_part(const std::string& part, const char* option) {
   }
 }
 
+const Format& format_of(const DatasetOptions& options) {
+  require_id_part(options.name, "name");
+  require_id_part(options.split, "split");
+  std::string known;
+  for (const Format& format : kFormats) {
+    if (options.format == format.name) return format;
+    known += fmt::format("{}{}", known.empty() ? "" : ", ", format.name);
+  }
+  throw std::invalid_argument(
+      fmt::format("dataset {}: format: got \"{}\", expected one of {}", options.name, options.format, known));
+}
+
 }  // namespace
 
 std::vector<std::string> dataset_formats() {
@@ -64,15 +78,27 @@ bool takes_topology(const std::string& format) {
 }
 
 Dataset load_dataset(const DatasetOptions& options) {
-  require_id_part(options.name, "name");
-  require_id_part(options.split, "split");
-  std::string known;
-  for (const Format& format : kFormats) {
-    if (options.format == format.name) return format.parser(options);
-    known += fmt::format("{}{}", known.empty() ? "" : ", ", format.name);
+  const Format& format = format_of(options);
+  if (format.parser != nullptr) return format.parser(options);
+  std::vector<SampleRecord> records;
+  Dataset dataset = format.piece_parser(options, [&](std::vector<SampleRecord>&& part) {
+    records.insert(records.end(), std::make_move_iterator(part.begin()), std::make_move_iterator(part.end()));
+  });
+  dataset.records = std::move(records);
+  return dataset;
+}
+
+Dataset stream_dataset(const DatasetOptions& options, const TakeRecords& take) {
+  const Format& format = format_of(options);
+  if (format.piece_parser != nullptr) return format.piece_parser(options, take);
+  Dataset dataset = format.parser(options);
+  const auto all = std::make_move_iterator(dataset.records.begin());
+  for (std::size_t first = 0; first < dataset.records.size(); first += kRecordsAtOnce) {
+    const std::size_t end = std::min(first + kRecordsAtOnce, dataset.records.size());
+    take({all + static_cast<std::ptrdiff_t>(first), all + static_cast<std::ptrdiff_t>(end)});
   }
-  throw std::invalid_argument(
-      fmt::format("dataset {}: format: got \"{}\", expected one of {}", options.name, options.format, known));
+  dataset.records = {};
+  return dataset;
 }
 
 Loading::Loading(const DatasetOptions& dataset_options, const std::filesystem::path& default_images)
@@ -170,12 +196,16 @@ void set_family(Loading& loading, std::optional<Family> stated, std::optional<Fa
   }
 }
 
-Dataset finished(Loading& loading, std::vector<SampleRecord> records) {
+void bound_texts(std::vector<SampleRecord>& records) {
   for (SampleRecord& record : records) {
     for (std::string* text : {&record.species, &record.source, &record.failure_detail}) {
       *text = bounded_text(std::move(*text));
     }
   }
+}
+
+Dataset finished(Loading& loading, std::vector<SampleRecord> records) {
+  bound_texts(records);
   const auto note = [&](const char* text, std::size_t count, NoteKind kind = NoteKind::remark) {
     if (count > 0) loading.notes.add(fmt::format("{}: {}", text, count), kind);
   };

@@ -1,7 +1,9 @@
 // Loads annotation files as sample records.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -67,5 +69,15 @@ bool takes_topology(const std::string& format);
 // short, wrong top-level type, keypoint names of another dataset). A bad record does not throw; it is
 // returned with its failure.
 Dataset load_dataset(const DatasetOptions& options);
+
+// Takes the next records of a dataset, in file order.
+using TakeRecords = std::function<void(std::vector<manifests::SampleRecord>&&)>;
+inline constexpr std::size_t kRecordsAtOnce = 1024;
+
+// The same for datasets of any length: gives `take` the records in parts of at most kRecordsAtOnce, and
+// returns the dataset without them. A file of the format "prima" is read piece by piece, so that the memory
+// does not depend on its length; what is wrong near its end is thrown after `take` had what stands before.
+// The files of other formats are read as a whole.
+Dataset stream_dataset(const DatasetOptions& options, const TakeRecords& take);
 
 }  // namespace q3d::loaders::formats

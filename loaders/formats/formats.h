@@ -14,7 +14,7 @@
 
 namespace q3d::loaders::formats {
 
-Dataset load_prima(const DatasetOptions& options);
+Dataset stream_prima(const DatasetOptions& options, const TakeRecords& take);
 Dataset load_superanimal(const DatasetOptions& options);
 Dataset load_animal_kingdom(const DatasetOptions& options);
 Dataset load_stanford_extra(const DatasetOptions& options);
@@ -71,7 +71,10 @@ void check_visible(RecordReader& reader, const std::string& field, const manifes
 void set_family(Loading& loading, std::optional<manifests::Family> stated,
                 std::optional<manifests::Family> from_table, manifests::SampleRecord& sample);
 
-// Appends the finder's notes and returns the result.
+// Cuts the texts of records that a hostile file may make as long as it likes.
+void bound_texts(std::vector<manifests::SampleRecord>& records);
+
+// Bounds the records' texts, appends the finder's notes and returns the result.
 Dataset finished(Loading& loading, std::vector<manifests::SampleRecord> records);
 
 }  // namespace q3d::loaders::formats

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <functional>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
@@ -125,8 +126,10 @@ std::optional<FoundPicture> PictureFinder::find_absolute(const NameReading& read
     if (!found) continue;
     if (found->failure == Reason::none) {
       ++found_by_tail_;
-      const auto known = name_of_tail_.emplace(found->path.string(), name);
-      if (!known.second && known.first->second != name) ++shared_files_;
+      const std::uint64_t hash = std::hash<std::string>()(name);
+      const auto [file, is_new] = files_of_tails_.add(found->path.native());
+      if (is_new) first_names_.push_back(hash);
+      if (first_names_[file] != hash) ++shared_files_;
     }
     return found;
   }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -10,6 +11,7 @@
 #include <vector>
 
 #include "loaders/formats/picture_name.h"
+#include "manifests/path_table.h"
 #include "manifests/sample.h"
 
 namespace q3d::loaders::formats {
@@ -84,8 +86,8 @@ class PictureFinder {
   std::size_t found_by_tail_ = 0;
   std::size_t found_by_reading_ = 0;
   std::size_t found_by_spelling_ = 0;
-  std::unordered_map<std::string, std::string>
-      name_of_tail_;  // file found by a tail -> the first name that led to it
+  manifests::PathTable files_of_tails_;     // found by their tails
+  std::vector<std::uint64_t> first_names_;  // by such a file's number: hash of the first name that led to it
   std::size_t shared_files_ = 0;
 };
 

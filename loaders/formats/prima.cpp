@@ -7,6 +7,7 @@
 #include "loaders/formats/formats.h"
 #include "loaders/formats/other_tools.h"
 #include "loaders/formats/several_animals.h"
+#include "manifests/json_elements.h"
 #include "manifests/json_file.h"
 
 namespace q3d::loaders::formats {
@@ -145,29 +146,52 @@ SampleRecord read_record(const nlohmann::json& record, const std::string& place,
   return sample;
 }
 
+// Collects records and passes them on in parts.
+class RecordParts {
+ public:
+  explicit RecordParts(const TakeRecords& take) : take_(take) {}
+
+  void add(SampleRecord record) {
+    records_.push_back(std::move(record));
+    if (records_.size() == kRecordsAtOnce) pass_on();
+  }
+  void pass_on() {
+    bound_texts(records_);
+    take_(std::move(records_));
+    records_ = {};
+  }
+
+ private:
+  const TakeRecords& take_;
+  std::vector<SampleRecord> records_;
+};
+
 }  // namespace
 
-Dataset load_prima(const DatasetOptions& options) {
+Dataset stream_prima(const DatasetOptions& options, const TakeRecords& take) {
   Loading loading(options, {});
-  const nlohmann::json document = manifests::read_json_file(loading.file);
-  refuse_other_form(document, options.format, loading.file);
-  const nlohmann::json& data = manifests::array_of(document, "data", loading.file);
-  std::vector<SampleRecord> records;
-  records.reserve(data.size());
+  RecordParts records(take);
+  std::size_t index = 0;
   std::size_t split = 0;
-  for (std::size_t i = 0; i < data.size(); ++i) {
-    const std::vector<nlohmann::json> animals = one_record_an_animal(data[i]);
-    if (animals.empty()) records.push_back(read_record(data[i], std::to_string(i), loading));
+  const auto add = [&](const nlohmann::json& record) {
+    const std::vector<nlohmann::json> animals = one_record_an_animal(record);
+    if (animals.empty()) records.add(read_record(record, std::to_string(index), loading));
     for (std::size_t k = 0; k < animals.size(); ++k) {
-      records.push_back(read_record(animals[k], fmt::format("{}.{}", i, k), loading));
+      records.add(read_record(animals[k], fmt::format("{}.{}", index, k), loading));
     }
     split += animals.empty() ? 0 : 1;
-  }
+    ++index;
+  };
+  const nlohmann::json document =
+      manifests::read_json_elements(loading.file, "data", [&](nlohmann::json&& record) { add(record); });
+  refuse_other_form(document, options.format, loading.file);
+  manifests::array_of(document, "data", loading.file);
+  records.pass_on();
   if (split > 0) {
     loading.notes.add(
         fmt::format("records that hold several animals, each of which becomes a sample: {}", split));
   }
-  return finished(loading, std::move(records));
+  return finished(loading, {});
 }
 
 }  // namespace q3d::loaders::formats

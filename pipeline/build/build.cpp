@@ -23,16 +23,17 @@ namespace {
 
 // The datasets with pseudo labels, by name, with the errors of their predictions.
 std::vector<PoolErrors> pools_of(const config::JudgingRules& rules, const candidates::Ingest& ingest,
-                                 const std::vector<manifests::Judgement>& judgements) {
+                                 const dataset::JudgementList& judgements) {
+  if (rules.thresholds.empty()) return {};
   std::map<std::string, PoolErrors> pools;
   for (const auto& [name, thresholds] : rules.thresholds) pools[name] = {name, true, {}, thresholds.tau_high};
-  for (std::size_t i = 0; i < judgements.size(); ++i) {
-    const candidates::Candidate& candidate = ingest.candidates[i];
-    if (candidate.role != config::Role::pseudo) continue;
+  const auto add = [&](const auto&, const auto& candidate, const auto& judgement) {
+    if (candidate.role != config::Role::pseudo) return;
     PoolErrors& pool = pools.at(candidate.record.dataset);
     if (ingest.rendered.count(candidates::dataset_key(candidate.record)) == 0) pool.is_rendered = false;
-    if (!std::isnan(judgements[i].initial_error)) pool.errors.push_back(judgements[i].initial_error);
-  }
+    if (!std::isnan(judgement.initial_error)) pool.errors.push_back(judgement.initial_error);
+  };
+  dataset::for_each_verdict(ingest, judgements, add);
   std::vector<PoolErrors> list;
   for (auto& [name, pool] : pools) list.push_back(std::move(pool));
   return list;

@@ -43,9 +43,17 @@ constexpr double kNoLimit = std::numeric_limits<double>::infinity();
 
 // A candidate with a prediction.
 struct Scored {
-  const candidates::Candidate* candidate = nullptr;
+  std::size_t candidate = 0;  // its place in the pool
+  const config::DatasetConfig* dataset = nullptr;
   filters::ScoredSample score;
 };
+
+const config::DatasetConfig& dataset_of(const manifests::SampleRecord& record,
+                                        const config::BuildConfig& config) {
+  return *std::find_if(config.datasets.begin(), config.datasets.end(), [&](const auto& dataset) {
+    return dataset.name == record.dataset && dataset.split == record.split;
+  });
+}
 
 // Takes every unit as far as its predictions, using those of an earlier run. The caller adds `write`.
 unit::UnitFlow prediction_flow(const config::BuildConfig& config, Workspace& workspace,
@@ -110,7 +118,9 @@ std::vector<Scored> score_pool(const config::BuildConfig& config, Workspace& wor
       if (!is_judged || candidate.exclusion.reason != manifests::Reason::none) continue;
       const auto auc = filters::auc((*work.predicted)[i].body.keypoints_2d, work.keypoints[i],
                                     loaders::pictures::kPatchSidePx);
-      scored.push_back({&candidate, {work.errors[i], 100.0 * auc.value()}});
+      scored.push_back({work.unit->first + i,
+                        &dataset_of(candidate.record, config),
+                        {work.errors[i], 100.0 * auc.value()}});
     }
     if (work.predicted_before) progress.advance(static_cast<std::int64_t>(work.unit->count), true);
   };
@@ -149,15 +159,17 @@ std::vector<Scored> predict_pool(const config::BuildConfig& config, Workspace& w
 // the middle band.
 std::vector<bool> adapt_some(const std::vector<const Scored*>& candidates, const filters::Thresholds& limits,
                              const config::BuildConfig& config, Workspace& workspace) {
+  std::vector<manifests::SampleRecord> records(candidates.size());
   std::vector<std::vector<std::uint8_t>> patches(candidates.size());
   tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t i) {
-    patches[i] = unit::decode_sample(candidates[i]->candidate->record, {.patch = true}, config.shards).patch;
+    records[i] = workspace.ingest().candidates.at(candidates[i]->candidate).record;
+    patches[i] = unit::decode_sample(records[i], {.patch = true}, config.shards).patch;
   });
   std::vector<device::AdaptRequest> requests;
   std::vector<std::size_t> positions;
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     if (patches[i].empty()) continue;
-    const manifests::SampleRecord& record = candidates[i]->candidate->record;
+    const manifests::SampleRecord& record = records[i];
     requests.push_back(unit::adapt_request(record.id, unit::crop_keypoints(record), patches[i],
                                            candidates[i]->score.initial_error, limits, config.guards));
     positions.push_back(i);
@@ -268,10 +280,9 @@ std::vector<dataset::Warning> warnings_of(const std::vector<Scored>& scored,
                                           const config::BuildConfig& config, const Workspace& workspace) {
   std::map<std::string, PoolErrors> pools;
   for (const Scored& each : scored) {
-    const manifests::SampleRecord& record = each.candidate->record;
-    PoolErrors& pool =
-        pools.try_emplace(record.dataset, PoolErrors{record.dataset, true, {}, 0.0}).first->second;
-    if (workspace.ingest().rendered.count(candidates::dataset_key(record)) == 0) pool.is_rendered = false;
+    const std::string& name = each.dataset->name;
+    PoolErrors& pool = pools.try_emplace(name, PoolErrors{name, true, {}, 0.0}).first->second;
+    if (workspace.ingest().rendered.count(name + "/" + each.dataset->split) == 0) pool.is_rendered = false;
     pool.errors.push_back(each.score.initial_error);
   }
   std::vector<PoolErrors> list;
@@ -295,7 +306,7 @@ std::map<std::string, std::vector<Scored>> split_pool(std::vector<Scored> scored
   for (const config::DatasetConfig& dataset : config.datasets) {
     if (dataset.role == config::Role::pseudo) pools[dataset.name];
   }
-  for (const Scored& each : scored) pools[each.candidate->record.dataset].push_back(each);
+  for (const Scored& each : scored) pools[each.dataset->name].push_back(each);
   return pools;
 }
 

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <atomic>
 #include <charconv>
-#include <stdexcept>
+#include <iterator>
 #include <string_view>
 #include <system_error>
 
@@ -21,23 +21,21 @@ using manifests::FileStamp;
 using manifests::next_field;
 using manifests::stamp_of;
 
-constexpr std::string_view kAbsent = "absent";
+// The first character of a line.
+constexpr char kFolder = '/';
+constexpr char kAbsent = '-';
+constexpr char kPresent = '+';
 
 template <typename Integer>
-Integer number(std::string_view text) {
-  Integer value = 0;
+bool take_number(std::string_view& line, Integer& value) {
+  const std::string_view text = next_field(line, ' ');
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || text.empty()) {
-    throw std::invalid_argument(fmt::format("a file's stamp: got '{}', expected a number", text));
-  }
-  return value;
+  return error == std::errc() && end == text.data() + text.size() && !text.empty();
 }
 
 }  // namespace
 
 std::vector<StampedFile> stamp_files(std::vector<std::string> paths) {
-  std::sort(paths.begin(), paths.end());
-  paths.erase(std::unique(paths.begin(), paths.end()), paths.end());
   std::vector<StampedFile> files(paths.size());
   tbb::parallel_for(std::size_t{0}, paths.size(), [&](std::size_t i) {
     files[i].stamp = stamp_of(paths[i]);
@@ -46,7 +44,7 @@ std::vector<StampedFile> stamp_files(std::vector<std::string> paths) {
   return files;
 }
 
-bool have_stamps(const std::vector<StampedFile>& files) {
+bool have_stamps(std::span<const StampedFile> files) {
   std::atomic<bool> all = true;
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, files.size(), 256),
                     [&](const tbb::blocked_range<std::size_t>& range) {
@@ -57,7 +55,7 @@ bool have_stamps(const std::vector<StampedFile>& files) {
   return all;
 }
 
-std::int64_t newest_change_ns(const std::vector<StampedFile>& files) {
+std::int64_t newest_change_ns(std::span<const StampedFile> files) {
   std::int64_t newest = 0;
   for (const StampedFile& file : files) {
     if (file.stamp) newest = std::max({newest, file.stamp->mtime_ns, file.stamp->ctime_ns});
@@ -84,42 +82,50 @@ std::optional<std::vector<std::string>> folders_below(const fs::path& folder, co
   return folders;
 }
 
-std::optional<std::string> to_text(std::vector<StampedFile> files) {
-  // Stable, so that equal lists give equal text also where a path is in them twice.
-  std::stable_sort(files.begin(), files.end(),
-                   [](const StampedFile& a, const StampedFile& b) { return a.path < b.path; });
-  std::string text;
+bool StampWriter::append(std::span<const StampedFile> files, std::string& text) {
+  const auto into = std::back_inserter(text);
   for (const StampedFile& file : files) {
-    if (file.path.find('\n') != std::string::npos) return std::nullopt;
+    if (file.path.find('\n') != std::string::npos) return false;
+    const std::string_view path = file.path;
+    const std::string_view folder = path.substr(0, path.rfind('/') + 1);
+    if (folder != folder_) {
+      folder_ = folder;
+      fmt::format_to(into, "{} {}\n", kFolder, folder);
+    }
+    const std::string_view name = path.substr(folder.size());
     if (!file.stamp) {
-      text += fmt::format("{} {}\n", kAbsent, file.path);
+      fmt::format_to(into, "{} {}\n", kAbsent, name);
       continue;
     }
     const FileStamp& stamp = *file.stamp;
-    text += fmt::format("{} {} {} {} {} {}\n", stamp.size, stamp.mtime_ns, stamp.ctime_ns, stamp.inode,
-                        stamp.device, file.path);
+    fmt::format_to(into, "{} {} {} {} {} {} {}\n", kPresent, stamp.size, stamp.mtime_ns, stamp.ctime_ns,
+                   stamp.inode, stamp.device, name);
   }
-  return text;
+  return true;
 }
 
-std::vector<StampedFile> stamps_from_text(std::string_view text) {
-  std::vector<StampedFile> files;
-  while (!text.empty()) {
-    std::string_view line = next_field(text, '\n');
-    StampedFile& file = files.emplace_back();
-    const std::string_view first = next_field(line, ' ');
-    if (first != kAbsent) {
-      FileStamp stamp;
-      stamp.size = number<std::uint64_t>(first);
-      stamp.mtime_ns = number<std::int64_t>(next_field(line, ' '));
-      stamp.ctime_ns = number<std::int64_t>(next_field(line, ' '));
-      stamp.inode = number<std::uint64_t>(next_field(line, ' '));
-      stamp.device = number<std::uint64_t>(next_field(line, ' '));
-      file.stamp = stamp;
-    }
-    file.path = line;
+bool StampReader::read(std::string_view line, std::vector<StampedFile>& files) {
+  const std::string_view kind = next_field(line, ' ');
+  if (kind.size() != 1) return false;
+  if (kind[0] == kFolder) {
+    folder_ = line;
+    return true;
   }
-  return files;
+  std::optional<FileStamp> stamp;
+  if (kind[0] == kPresent) {
+    stamp.emplace();
+    const bool is_whole = take_number(line, stamp->size) && take_number(line, stamp->mtime_ns) &&
+                          take_number(line, stamp->ctime_ns) && take_number(line, stamp->inode) &&
+                          take_number(line, stamp->device);
+    if (!is_whole) return false;
+  } else if (kind[0] != kAbsent) {
+    return false;
+  }
+  StampedFile& file = files.emplace_back();
+  file.path.reserve(folder_.size() + line.size());
+  file.path.append(folder_).append(line);
+  file.stamp = stamp;
+  return true;
 }
 
 }  // namespace q3d::pipeline::build

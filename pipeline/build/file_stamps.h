@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -17,13 +18,13 @@ struct StampedFile {
   std::optional<manifests::FileStamp> stamp;  // nothing: there is no such file, and there must be none
 };
 
-// Takes the stamps in parallel.
+// Takes the stamps in parallel, in the order of the paths.
 std::vector<StampedFile> stamp_files(std::vector<std::string> paths);
 // Says whether each file still has its stamp. Compares in parallel, and stops at the first that has not.
-bool have_stamps(const std::vector<StampedFile>& files);
+bool have_stamps(std::span<const StampedFile> files);
 
 // The newest change of any of the files, in ns since 1970; 0 if there are none.
-std::int64_t newest_change_ns(const std::vector<StampedFile>& files);
+std::int64_t newest_change_ns(std::span<const StampedFile> files);
 
 // The folder and every folder below it, without those reached through symbolic links and without `except`. A
 // file that is added, removed or renamed changes the stamp of its folder. Nothing if there are more than
@@ -31,9 +32,24 @@ std::int64_t newest_change_ns(const std::vector<StampedFile>& files);
 std::optional<std::vector<std::string>> folders_below(const std::filesystem::path& folder,
                                                       const std::filesystem::path& except, std::size_t most);
 
-// The files as text, sorted, one line each; nothing if a path holds a line feed.
-std::optional<std::string> to_text(std::vector<StampedFile> files);
-// Throws std::invalid_argument for another text.
-std::vector<StampedFile> stamps_from_text(std::string_view text);
+// Writes files as lines of text. Files of one folder that follow each other share a line for the folder.
+class StampWriter {
+ public:
+  // Appends the files' lines. Returns false if a path holds a line feed and so fits no line.
+  bool append(std::span<const StampedFile> files, std::string& text);
+
+ private:
+  std::string folder_;  // of the last file, with its '/'
+};
+
+// Reads the lines of a StampWriter, given in their order and without line feeds.
+class StampReader {
+ public:
+  // Appends the line's file, if it is not a folder's line. Returns false if it is neither.
+  bool read(std::string_view line, std::vector<StampedFile>& files);
+
+ private:
+  std::string folder_;
+};
 
 }  // namespace q3d::pipeline::build

@@ -6,13 +6,16 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "manifests/atomic_file.h"
 #include "manifests/csv_formula.h"
 #include "manifests/digest.h"
+#include "manifests/enumerators.h"
 #include "manifests/file_descriptor.h"
 #include "manifests/link_file.h"
 #include "manifests/sealed_json.h"
+#include "pipeline/dataset/verdict_rows.h"
 #include "pipeline/run/interrupt.h"
 #include "pipeline/run/log.h"
 #include "pipeline/stages/build_plan.h"
@@ -39,10 +42,8 @@ std::vector<dataset::ShardEntry> link_shards(const fs::path& folder, const candi
   return entries;
 }
 
-void check_sums(const candidates::Ingest& ingest, const std::vector<manifests::Judgement>& judgements,
+void check_sums(const candidates::Ingest& ingest, const dataset::Counts& counts,
                 const std::vector<dataset::ShardEntry>& shards) {
-  dataset::Counts counts;
-  for (const auto& judgement : judgements) counts.add(judgement.verdict);
   std::int64_t rows = 0;
   for (const dataset::ShardEntry& shard : shards) rows += shard.rows;
   const auto candidates = static_cast<std::int64_t>(ingest.candidates.size());
@@ -56,16 +57,18 @@ void check_sums(const candidates::Ingest& ingest, const std::vector<manifests::J
   }
 }
 
-// Names come from annotation files, and verdicts.csv may be opened in a spreadsheet.
-void warn_of_formulas(const candidates::Ingest& ingest, const std::vector<manifests::Judgement>& judgements) {
-  std::int64_t cells = 0;
-  for (std::size_t i = 0; i < judgements.size(); ++i) {
-    const manifests::SampleRecord& record = ingest.candidates[i].record;
-    for (const std::string* cell : {&record.id, &record.dataset, &record.split, &record.source,
-                                    &record.species, &judgements[i].detail}) {
-      cells += manifests::looks_like_formula(*cell) ? 1 : 0;
-    }
+int formula_cells(const candidates::Candidate& candidate, const manifests::Judgement& judgement) {
+  const manifests::SampleRecord& record = candidate.record;
+  int cells = 0;
+  for (const std::string* cell :
+       {&record.id, &record.dataset, &record.split, &record.source, &record.species, &judgement.detail}) {
+    cells += manifests::looks_like_formula(*cell) ? 1 : 0;
   }
+  return cells;
+}
+
+// Names come from annotation files, and verdicts.csv may be opened in a spreadsheet.
+void warn_of_formulas(std::int64_t cells) {
   if (cells == 0) return;
   run::log_warning(fmt::format(
       "{} cells of verdicts.csv begin with =, +, - or @, so that a spreadsheet may run them as formulas; "
@@ -135,14 +138,27 @@ bool is_published(const fs::path& folder, const stages::StageKeys& keys) {
 }
 
 void publish(const fs::path& folder, const dataset::DatasetInputs& inputs,
-             const std::vector<manifests::Judgement>& judgements, stages::StageStore& shards) {
+             const dataset::JudgementList& judgements, stages::StageStore& shards) {
   const candidates::Ingest& ingest = *inputs.ingest;
   const std::vector<dataset::ShardEntry> entries = link_shards(folder, ingest, shards);
-  check_sums(ingest, judgements, entries);
-  const std::string csv = dataset::verdicts_csv(ingest, judgements);
-  warn_of_formulas(ingest, judgements);
-  manifests::write_file_atomically(folder / "verdicts.csv", csv);
-  const std::string document = dataset::dataset_json(inputs, judgements, entries, manifests::sha256(csv));
+  dataset::VerdictBooks books;
+  std::int64_t formulas = 0;
+  std::int64_t unit_of_row = -1;
+  std::int64_t row = 0;
+  manifests::AtomicWriter verdicts(folder / "verdicts.csv");
+  verdicts.write(dataset::verdict_header());
+  const auto add = [&](const auto& unit, const auto& candidate, const auto& judgement) {
+    if (std::exchange(unit_of_row, unit.index) != unit.index) row = 0;
+    verdicts.write(dataset::verdict_row(candidate, judgement, unit.index, row));
+    row += manifests::is_kept(judgement.verdict) ? 1 : 0;
+    formulas += formula_cells(candidate, judgement);
+    books.add(candidate, judgement);
+  };
+  dataset::for_each_verdict(ingest, judgements, add);
+  check_sums(ingest, books.counts(), entries);
+  warn_of_formulas(formulas);
+  const std::string verdicts_sha256 = verdicts.commit();
+  const std::string document = dataset::dataset_json(inputs, books, entries, verdicts_sha256);
   manifests::write_file_atomically(folder / "dataset.json", document);
   manifests::sync_folder(folder.parent_path());
 }

@@ -2,9 +2,9 @@
 #pragma once
 
 #include <filesystem>
-#include <vector>
 
 #include "pipeline/dataset/dataset_manifest.h"
+#include "pipeline/dataset/judgement_list.h"
 #include "pipeline/stages/stage_store.h"
 
 namespace q3d::pipeline::build {
@@ -23,7 +23,7 @@ bool is_published(const std::filesystem::path& folder, const stages::StageKeys& 
 // last, dataset.json. When it returns, all of it has reached the disk. Throws std::runtime_error when the
 // verdicts do not add up to the candidates or a unit has no shard.
 void publish(const std::filesystem::path& folder, const dataset::DatasetInputs& inputs,
-             const std::vector<manifests::Judgement>& judgements, stages::StageStore& shards);
+             const dataset::JudgementList& judgements, stages::StageStore& shards);
 
 // Makes <out>/latest a link to the version's folder, in one step, and durable.
 void point_latest(const std::filesystem::path& out, const std::filesystem::path& folder);

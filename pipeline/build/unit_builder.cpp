@@ -1,6 +1,5 @@
 #include "pipeline/build/unit_builder.h"
 
-#include <algorithm>
 #include <utility>
 
 #include "filters/guards.h"
@@ -33,8 +32,7 @@ UnitBuilder::UnitBuilder(const config::BuildConfig& config, const config::Judgin
       crops_(workspace.out(), "crops", keys.crops, &candidates::Unit::input_digest, ranks.of_store()),
       shards_(workspace.out(), "shards", keys.shards, &candidates::Unit::label_digest, ranks.of_store()),
       terms_(dataset::terms_of_datasets(config)),
-      judgements_(workspace.ingest().candidates.size()),
-      is_made_(workspace.ingest().units.size()),
+      judgements_(workspace.scratch(), workspace.ingest().units.size()),
       progress_(
           rules,
           {.judges = makes(Stage::fidelity),
@@ -84,9 +82,10 @@ void UnitBuilder::collect() {
   if (measurements_) measurements_->take_over_ranks();
   progress_.others({});  // these units are counted by their verdicts now
   unit::UnitFlow rest = flow();
-  rest.claim = [this, next = std::size_t{0}]() mutable -> std::optional<std::int64_t> {
-    while (next < is_made_.size() && is_made_[next]) ++next;
-    return next < is_made_.size() ? std::optional(static_cast<std::int64_t>(next++)) : std::nullopt;
+  rest.claim = [this, next = std::int64_t{0}]() mutable -> std::optional<std::int64_t> {
+    const auto units = static_cast<std::int64_t>(judgements_.units());
+    while (next < units && judgements_.has(next)) ++next;
+    return next < units ? std::optional(next++) : std::nullopt;
   };
   unit::run_units(rest, workspace_.device());
 }
@@ -157,9 +156,7 @@ void UnitBuilder::write(unit::UnitWork& work) {
   if (work.crops_encoded > 0) crops_.save(unit, unit::to_table(work.crops));
   crops_encoded_ += static_cast<std::int64_t>(work.crops_encoded);
   if (makes(Stage::shards) && !work.shard_before) write_unit_shard(work);
-  std::copy(work.judgements.begin(), work.judgements.end(),
-            judgements_.begin() + static_cast<std::ptrdiff_t>(unit.first));
-  is_made_[static_cast<std::size_t>(unit.index)] = true;
+  judgements_.set(unit.index, work.judgements);
 }
 
 void UnitBuilder::write_unit_shard(unit::UnitWork& work) {

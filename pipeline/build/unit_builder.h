@@ -14,6 +14,7 @@
 #include "pipeline/build/unit_progress.h"
 #include "pipeline/build/workspace.h"
 #include "pipeline/config/judging_rules.h"
+#include "pipeline/dataset/judgement_list.h"
 #include "pipeline/stages/stage.h"
 #include "pipeline/stages/stage_store.h"
 #include "pipeline/unit/label_measurer.h"
@@ -32,9 +33,9 @@ class UnitBuilder {
   // undone. Throws std::runtime_error, manifests::IoError, Interrupted.
   void run();
 
-  // The judgements of all candidates, in ingest order; a rank other than 0 has those that it made. They are
-  // final only if `until` is the last stage.
-  const std::vector<manifests::Judgement>& judgements() const { return judgements_; }
+  // The judgements of every unit; a rank other than 0 has those that it made. They are final only if `until`
+  // is the last stage.
+  const dataset::JudgementList& judgements() const { return judgements_; }
   stages::StageStore& shards() { return shards_; }
   std::int64_t crops_encoded() const { return crops_encoded_; }  // by this process
 
@@ -64,8 +65,7 @@ class UnitBuilder {
   std::optional<stages::StageStore> measurements_;  // where there are pseudo labels and they are measured
   std::unique_ptr<unit::LabelMeasurer> measurer_;   // made and used on the device's thread
   std::map<std::string, manifests::DatasetTerms> terms_;  // by candidates::dataset_key
-  std::vector<manifests::Judgement> judgements_;
-  std::vector<bool> is_made_;  // by unit: its judgements are there
+  dataset::JudgementList judgements_;
   std::int64_t crops_encoded_ = 0;
   UnitProgress progress_;
 };

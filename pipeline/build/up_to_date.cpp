@@ -5,16 +5,16 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
-#include <stdexcept>
+#include <span>
 #include <string_view>
 #include <thread>
 #include <utility>
 #include <vector>
 
 #include "manifests/atomic_file.h"
+#include "manifests/block_reader.h"
 #include "manifests/digest.h"
 #include "manifests/file_descriptor.h"
-#include "manifests/next_field.h"
 #include "pipeline/build/file_stamps.h"
 #include "pipeline/stages/build_plan.h"
 #include "pipeline/stages/stages.h"
@@ -24,9 +24,11 @@ namespace {
 
 namespace fs = std::filesystem;
 using loaders::formats::NoteKind;
+using manifests::PathTable;
 using nlohmann::json;
 
-constexpr int kForm = 1;  // of the record
+constexpr int kForm = 2;  // of the record
+constexpr std::size_t kFilesAtOnce = 16'384;
 constexpr std::size_t kMostEntries = 20'000'000;
 // Stamps of one tick of the file system's clock do not tell two writes apart. Linux ticks every 10 ms or
 // faster; a time in whole seconds comes from a file system that has no finer ones.
@@ -61,23 +63,23 @@ std::string request_digest(const fs::path& out, const config::BuildConfig& confi
   return manifests::sha256(request.dump());
 }
 
-void add(std::vector<std::string>& paths, const fs::path& path) {
-  if (!path.empty()) paths.push_back(fs::absolute(path).string());
+void add(PathTable& paths, const fs::path& path) {
+  if (!path.empty()) paths.add(fs::absolute(path).string());
 }
 
 // The files that make the program: it and its libraries of this project.
-void add_program(std::vector<std::string>& paths) {
+void add_program(PathTable& paths) {
   std::error_code error;
   const fs::path program = fs::read_symlink("/proc/self/exe", error);
-  if (!error) paths.push_back(program.string());
+  if (!error) paths.add(program.string());
 }
 
 // Changes of these bring pictures to light or hide them.
-bool add_folders(std::vector<std::string>& paths, const fs::path& folder, const fs::path& except) {
+bool add_folders(PathTable& paths, const fs::path& folder, const fs::path& except) {
   if (folder.empty()) return true;
   const auto found = folders_below(fs::absolute(folder).lexically_normal(), except, kMostEntries);
   if (!found) return false;
-  paths.insert(paths.end(), found->begin(), found->end());
+  for (const std::string& path : *found) paths.add(path);
   return true;
 }
 
@@ -95,6 +97,96 @@ void let_clock_tick(const std::vector<StampedFile>& files) {
   if (wait > 0 && wait <= kCoarseTickNs) std::this_thread::sleep_for(std::chrono::nanoseconds(wait));
 }
 
+// The text of a record, which ends with a line that has the digest of all before it.
+class RecordWriter {
+ public:
+  explicit RecordWriter(const fs::path& file) : file_(file) {}
+
+  void write(std::string_view text) {
+    digest_.update(std::as_bytes(std::span(text)));
+    file_.write(text);
+  }
+  // Returns false if a path fits no line.
+  bool write(std::span<const StampedFile> files) {
+    std::string text;
+    const bool fits = stamps_.append(files, text);
+    write(text);
+    return fits;
+  }
+  void commit() {
+    file_.write(digest_.hex() + '\n');
+    file_.commit();
+  }
+
+ private:
+  manifests::AtomicWriter file_;
+  manifests::Sha256 digest_;
+  StampWriter stamps_;
+};
+
+// Gives the lines of a record but the last.
+class RecordReader {
+ public:
+  explicit RecordReader(const fs::path& file) : lines_(file) { advance(); }
+
+  std::optional<std::string> next() {
+    if (!ahead_) return std::nullopt;
+    std::string line = std::move(*ahead_);
+    advance();
+    if (!ahead_) {
+      last_ = std::move(line);
+      return std::nullopt;
+    }
+    line += '\n';
+    digest_.update(std::as_bytes(std::span(line)));
+    line.pop_back();
+    return line;
+  }
+  // Once all lines were given: whether the last has the digest of the others.
+  bool is_sound() { return lines_.was_whole() && last_ == digest_.hex(); }
+
+ private:
+  void advance() {
+    const auto line = lines_.next();
+    ahead_ = line ? std::optional<std::string>(*line) : std::nullopt;
+  }
+
+  manifests::LineReader lines_;
+  std::optional<std::string> ahead_;
+  std::string last_;
+  manifests::Sha256 digest_;
+};
+
+// Whether every file of the record's remaining lines has its stamp.
+bool has_all_stamps(RecordReader& record) {
+  StampReader stamps;
+  std::vector<StampedFile> files;
+  for (bool is_end = false; !is_end;) {
+    const std::optional<std::string> line = record.next();
+    is_end = !line;
+    if (line && !stamps.read(*line, files)) return false;
+    if (!is_end && files.size() < kFilesAtOnce) continue;
+    if (!have_stamps(files)) return false;
+    files.clear();
+  }
+  return true;
+}
+
+// The result that a record's head states. Throws json::exception for anything else.
+UpToDateRecord::Unchanged result_in(const std::string& head, const fs::path& out) {
+  const json said = json::parse(head);
+  UpToDateRecord::Unchanged found{out / said.at("folder").get<std::string>(),
+                                  {},
+                                  said.at("candidates").get<std::int64_t>(),
+                                  said.at("units").get<std::int64_t>()};
+  for (const json& note : said.at("notes")) {
+    const bool is_caution = note.at(0).get<std::string>() == to_string(NoteKind::caution);
+    found.notes.push_back({is_caution ? NoteKind::caution : NoteKind::remark, note.at(1).get<std::string>(),
+                           note.at(2).get<std::string>()});
+  }
+  return found;
+}
+
 fs::path record_file(const fs::path& out, const std::string& request) {
   return stages::plans_folder(out) / (request.substr(0, stages::kShortKey) + ".stamps");
 }
@@ -108,44 +200,26 @@ UpToDateRecord::UpToDateRecord(const fs::path& out, const config::BuildConfig& c
       request_(request_digest(out, config, rules, device_key)),
       begun_ns_(now_ns()) {}
 
-// The record's lines after its head. Throws json::exception and std::invalid_argument for others.
-std::optional<UpToDateRecord::Unchanged> UpToDateRecord::read(std::string_view text) const {
-  const json said = json::parse(manifests::next_field(text, '\n'));
-  if (!have_stamps(stamps_from_text(text))) return std::nullopt;
-  Unchanged found{out_ / said.at("folder").get<std::string>(),
-                  {},
-                  said.at("candidates").get<std::int64_t>(),
-                  said.at("units").get<std::int64_t>()};
-  for (const json& note : said.at("notes")) {
-    const bool is_caution = note.at(0).get<std::string>() == to_string(NoteKind::caution);
-    found.notes.push_back({is_caution ? NoteKind::caution : NoteKind::remark, note.at(1).get<std::string>(),
-                           note.at(2).get<std::string>()});
-  }
-  return found;
-}
-
 std::optional<UpToDateRecord::Unchanged> UpToDateRecord::unchanged() const {
   const fs::path file = record_file(out_, request_);
   if (config_.leakage || !fs::exists(file)) return std::nullopt;
-  const std::string content = manifests::read_file(file);
-  std::string_view text = content;
-  const std::string_view head = manifests::next_field(text, '\n');
-  if (head != manifests::sha256(text) + ' ' + request_) return std::nullopt;
+  RecordReader record(file);
+  const std::optional<std::string> request = record.next();
+  const std::optional<std::string> head = record.next();
+  if (request != request_ || !head || !has_all_stamps(record) || !record.is_sound()) return std::nullopt;
   try {
-    return read(text);
+    return result_in(*head, out_);
   } catch (const json::exception&) {
-    return std::nullopt;
-  } catch (const std::invalid_argument&) {
     return std::nullopt;
   }
 }
 
-std::optional<std::vector<std::string>> UpToDateRecord::inputs(const candidates::Ingest& ingest) const {
-  std::vector<std::string> paths;
-  for (const candidates::Candidate& candidate : ingest.candidates) {
-    if (!candidate.record.image_path.empty()) paths.push_back(candidate.record.image_path);
-    if (!candidate.record.mask_path.empty()) paths.push_back(candidate.record.mask_path);
-  }
+std::optional<PathTable> UpToDateRecord::inputs(const candidates::Ingest& ingest) const {
+  PathTable paths;
+  ingest.candidates.for_each([&](std::size_t, const candidates::Candidate& candidate) {
+    if (!candidate.record.image_path.empty()) paths.add(candidate.record.image_path);
+    if (!candidate.record.mask_path.empty()) paths.add(candidate.record.mask_path);
+  });
   const fs::path except = fs::absolute(out_).lexically_normal();
   for (const fs::path& file : ingest.files) {
     add(paths, file);
@@ -174,18 +248,8 @@ std::optional<std::vector<std::string>> UpToDateRecord::inputs(const candidates:
 
 void UpToDateRecord::keep(const candidates::Ingest& ingest, const fs::path& folder) const {
   if (config_.leakage) return;
-  auto paths = inputs(ingest);
+  const auto paths = inputs(ingest);
   if (!paths) return;
-  std::vector<StampedFile> files = stamp_files(std::move(*paths));
-  const std::int64_t newest = newest_change_ns(files);
-  if (newest + tick_of(newest) > begun_ns_) return;  // a later build leaves the record
-  std::vector<StampedFile> published = stamp_files(published_files(folder));
-  let_clock_tick(published);
-  if (!have_stamps(published)) return;
-  files.insert(files.end(), std::make_move_iterator(published.begin()),
-               std::make_move_iterator(published.end()));
-  const auto stamps = to_text(std::move(files));
-  if (!stamps) return;
   json notes = json::array();
   for (const candidates::IngestNote& note : ingest.notes) {
     notes.push_back({to_string(note.kind), note.dataset, note.text});
@@ -194,9 +258,22 @@ void UpToDateRecord::keep(const candidates::Ingest& ingest, const fs::path& fold
                   {"candidates", ingest.candidates.size()},
                   {"units", ingest.units.size()},
                   {"notes", notes}};
-  const std::string text = said.dump() + '\n' + *stamps;
-  manifests::write_file_atomically(record_file(out_, request_),
-                                   fmt::format("{} {}\n{}", manifests::sha256(text), request_, text));
+  RecordWriter record(record_file(out_, request_));
+  record.write(request_ + '\n');
+  record.write(said.dump() + '\n');
+  std::int64_t newest = 0;
+  for (std::uint32_t first = 0; first < paths->size();) {
+    std::vector<std::string> part;
+    for (; first < paths->size() && part.size() < kFilesAtOnce; ++first) part.push_back(paths->path(first));
+    const std::vector<StampedFile> files = stamp_files(std::move(part));
+    newest = std::max(newest, newest_change_ns(files));
+    if (!record.write(files)) return;
+  }
+  if (newest + tick_of(newest) > begun_ns_) return;  // a later build leaves the record
+  const std::vector<StampedFile> published = stamp_files(published_files(folder));
+  let_clock_tick(published);
+  if (!have_stamps(published) || !record.write(published)) return;
+  record.commit();
 }
 
 }  // namespace q3d::pipeline::build

@@ -11,9 +11,9 @@
 #include <filesystem>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
+#include "manifests/path_table.h"
 #include "pipeline/candidates/ingest.h"
 #include "pipeline/config/build_config.h"
 #include "pipeline/config/judging_rules.h"
@@ -43,8 +43,7 @@ class UpToDateRecord {
   void keep(const candidates::Ingest& ingest, const std::filesystem::path& folder) const;
 
  private:
-  std::optional<Unchanged> read(std::string_view text) const;
-  std::optional<std::vector<std::string>> inputs(const candidates::Ingest& ingest) const;
+  std::optional<manifests::PathTable> inputs(const candidates::Ingest& ingest) const;
 
   std::filesystem::path out_;
   const config::BuildConfig& config_;

@@ -60,13 +60,13 @@ Workspace::Workspace(const config::BuildConfig& config, const run::RunOptions& o
       threads_(tbb::global_control::max_allowed_parallelism, flow_threads(options.threads)),
       lock_(locked(options.out, use)),
       scratch_(use != Use::work ? std::optional<ScratchCopy>(std::in_place, options.out) : std::nullopt),
-      digests_((scratch_ ? scratch_->folder() : options.out) / "digests.txt"),
+      digests_(scratch() / "digests.txt"),
       assets_(stages::digest_assets(config, digests_)),
       device_key_(config::needs_network(config) ? network::device_key(config.network) : std::string()),
       origins_(read_origins(config)),
-      ingest_(candidates::ingest(config, digests_, network::load_body_meshes)) {
+      ingest_(candidates::ingest(config, digests_, network::load_body_meshes, scratch())) {
   if (!scratch_) manifests::remove_temporaries(options.out);  // what a run that was killed left
-  leakage::leave_out(config, digests_, scratch_ ? scratch_->folder() : options.out, options.quiet, ingest_);
+  leakage::leave_out(config, digests_, scratch(), options.quiet, ingest_);
   log_candidates(static_cast<std::int64_t>(ingest_.candidates.size()),
                  static_cast<std::int64_t>(ingest_.units.size()), options_.quiet);
   if (use != Use::join) log_notes(ingest_.notes, options_.quiet);

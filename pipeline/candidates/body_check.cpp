@@ -68,20 +68,41 @@ void check_one(const Keypoints3d& body, bool take_body, manifests::SampleRecord&
   if (take_body) truth.keypoints_3d = body;
 }
 
+constexpr std::size_t kMeshesAtOnce = 256;  // 3,889 vertices each: some 12 MB
+
+bool is_compared(const manifests::SampleRecord& record) {
+  return record.failure == manifests::Reason::none && record.truth && record.truth->has_pose &&
+         record.truth->has_betas;
+}
+
 }  // namespace
+
+std::size_t records_of_one_call(const std::vector<manifests::SampleRecord>& records) {
+  std::size_t compared = 0;
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    compared += is_compared(records[i]) ? 1 : 0;
+    if (compared == kMeshesAtOnce) return i + 1;
+  }
+  return 0;
+}
+
+void add(const BodyCheck& further, BodyCheck& check) {
+  check.compared += further.compared;
+  check.apart += further.apart;
+  check.filled += further.filled;
+  if (further.largest_mm > check.largest_mm) {
+    check.largest_mm = further.largest_mm;
+    check.largest_id = further.largest_id;
+  }
+}
 
 BodyCheck check_bodies(const device::BodyMeshes& bodies, bool take_body,
                        std::vector<manifests::SampleRecord>& records) {
-  constexpr std::size_t kMeshesAtOnce = 256;  // 3,889 vertices each: some 12 MB
   BodyCheck check;
   check.findings.resize(records.size());
   std::vector<std::size_t> chosen;
   for (std::size_t i = 0; i < records.size(); ++i) {
-    const auto& record = records[i];
-    if (record.failure == manifests::Reason::none && record.truth && record.truth->has_pose &&
-        record.truth->has_betas) {
-      chosen.push_back(i);
-    }
+    if (is_compared(records[i])) chosen.push_back(i);
   }
   for (std::size_t first = 0; first < chosen.size(); first += kMeshesAtOnce) {
     const auto part = std::span(chosen).subspan(first, std::min(kMeshesAtOnce, chosen.size() - first));

@@ -30,6 +30,13 @@ struct BodyCheck {
 BodyCheck check_bodies(const device::BodyMeshes& bodies, bool take_body,
                        std::vector<manifests::SampleRecord>& records);
 
+// Returns how many of the first records make one call of the body model, since the last bits of a mesh may
+// depend on the others that are posed with it: up to the one that fills the call, or 0 if these do not.
+std::size_t records_of_one_call(const std::vector<manifests::SampleRecord>& records);
+
+// Adds what was found in further records, without their findings.
+void add(const BodyCheck& further, BodyCheck& check);
+
 // One line for the run's notes.
 std::string to_note(const BodyCheck& check);
 

@@ -12,5 +12,8 @@ namespace q3d::pipeline::candidates {
 // and for a list that is malformed, of another split, or of other annotation files. Throws std::runtime_error
 // as loaders::load_dataset does.
 loaders::formats::Dataset load_configured(const config::DatasetConfig& options);
+// The same, part by part (loaders::formats::stream_dataset): the dataset that is returned has no records.
+loaders::formats::Dataset stream_configured(const config::DatasetConfig& options,
+                                            const loaders::formats::TakeRecords& take);
 
 }  // namespace q3d::pipeline::candidates

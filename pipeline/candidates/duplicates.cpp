@@ -3,11 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
+#include <cstdint>
 #include <map>
+#include <stdexcept>
 #include <string>
-#include <unordered_map>
-#include <utility>
+#include <string_view>
+#include <system_error>
 
 namespace q3d::pipeline::candidates {
 namespace {
@@ -29,81 +32,145 @@ bool is_same_box(const manifests::Box& a, const manifests::Box& b) {
          std::abs(a.w_px - b.w_px) <= kRoundingPx && std::abs(a.h_px - b.h_px) <= kRoundingPx;
 }
 
+// What decides whether two candidates of one picture are one animal.
+struct Animal {
+  std::size_t index = 0;  // of the candidate
+  config::Role role = config::Role::pseudo;
+  int orientation = 1;
+  manifests::Box box;
+  manifests::Keypoints keypoints;
+  bool has_keypoints = false;
+
+  Animal(std::size_t place, const Candidate& candidate)
+      : index(place),
+        role(candidate.role),
+        orientation(candidate.record.orientation),
+        box(candidate.record.box),
+        keypoints(candidate.record.keypoints),
+        has_keypoints(std::any_of(keypoints.begin(), keypoints.end(),
+                                  [](const Keypoint& point) { return point.weight > 0.0F; })) {}
+};
+
 // Records without keypoints (photographs) are the same animal if they have the same box.
-bool is_same_animal(const Candidate& a, const Candidate& b) {
-  const bool has_keypoints = std::any_of(a.record.keypoints.begin(), a.record.keypoints.end(),
-                                         [](const Keypoint& point) { return point.weight > 0.0F; });
-  if (!has_keypoints && !is_same_box(a.record.box, b.record.box)) return false;
-  return a.role == b.role && a.record.orientation == b.record.orientation &&
-         std::equal(a.record.keypoints.begin(), a.record.keypoints.end(), b.record.keypoints.begin(),
-                    is_same_point);
+bool is_same_animal(const Animal& a, const Animal& b) {
+  if (!a.has_keypoints && !is_same_box(a.box, b.box)) return false;
+  return a.role == b.role && a.orientation == b.orientation &&
+         std::equal(a.keypoints.begin(), a.keypoints.end(), b.keypoints.begin(), is_same_point);
 }
 
 // Whether two samples of one picture look like labels of one animal by two people: most of the keypoints that
 // both have lie within a twentieth of the box's longer side.
-bool is_nearly_same_animal(const Candidate& a, const Candidate& b) {
+bool is_nearly_same_animal(const Animal& a, const Animal& b) {
   constexpr double kNear = 0.05;
   constexpr int kFewest = 3;
-  if (a.role != b.role || a.record.orientation != b.record.orientation) return false;
-  const double reach_px = kNear * std::max(a.record.box.w_px, a.record.box.h_px);
+  if (a.role != b.role || a.orientation != b.orientation) return false;
+  const double reach_px = kNear * std::max(a.box.w_px, a.box.h_px);
   int common = 0;
   int near = 0;
-  for (std::size_t i = 0; i < a.record.keypoints.size(); ++i) {
-    const Keypoint& p = a.record.keypoints[i];
-    const Keypoint& q = b.record.keypoints[i];
+  for (std::size_t i = 0; i < a.keypoints.size(); ++i) {
+    const Keypoint& p = a.keypoints[i];
+    const Keypoint& q = b.keypoints[i];
     if (!(p.weight > 0.0F && q.weight > 0.0F)) continue;
     ++common;
-    near += std::hypot(p.x_px - q.x_px, p.y_px - q.y_px) <= reach_px ? 1 : 0;
+    const double dx = p.x_px - q.x_px;
+    const double dy = p.y_px - q.y_px;
+    // Most points lie apart, which one coordinate shows.
+    if (std::abs(dx) > reach_px || std::abs(dy) > reach_px) continue;
+    near += std::hypot(dx, dy) <= reach_px ? 1 : 0;
   }
   return common >= kFewest && 2 * near > common;
 }
 
+// Candidates of one dataset that repeat another.
 struct Repeated {
   std::size_t count = 0;
-  std::string first;
+  std::size_t first = 0;  // the first of them
+  std::size_t of = 0;     // the one that it repeats
+
+  void add(std::size_t index, std::size_t repeats) {
+    if (count++ > 0 && index > first) return;
+    first = index;
+    of = repeats;
+  }
+};
+
+using RepeatedByDataset = std::map<std::string, Repeated>;
+
+// Compares the candidates of one picture with each other.
+class PictureGroups {
+ public:
+  explicit PictureGroups(CandidateList& candidates) : candidates_(candidates) {}
+
+  // `group` holds places of candidates whose pictures' digests begin alike.
+  void add(const std::vector<std::size_t>& group) {
+    std::map<std::string, std::vector<Animal>> kept;  // by the whole digest
+    for (const std::size_t index : group) {
+      const Candidate candidate = candidates_.at(index);
+      compare(candidate, Animal(index, candidate), kept[candidate.image_sha256]);
+    }
+  }
+  const RepeatedByDataset& repeated() const { return repeated_; }
+  const RepeatedByDataset& nearly_repeated() const { return nearly_repeated_; }
+
+ private:
+  void compare(const Candidate& candidate, const Animal& animal, std::vector<Animal>& earlier) {
+    const auto same = std::find_if(earlier.begin(), earlier.end(),
+                                   [&](const Animal& each) { return is_same_animal(each, animal); });
+    const std::string dataset = dataset_key(candidate.record);
+    if (same != earlier.end()) {
+      candidates_.fail(animal.index, manifests::Reason::duplicate,
+                       "it is that of " + candidates_.at(same->index).record.id);
+      repeated_[dataset].add(animal.index, same->index);
+      return;
+    }
+    const auto near = std::find_if(earlier.begin(), earlier.end(),
+                                   [&](const Animal& each) { return is_nearly_same_animal(each, animal); });
+    if (near != earlier.end()) nearly_repeated_[dataset].add(animal.index, near->index);
+    earlier.push_back(animal);
+  }
+
+  CandidateList& candidates_;
+  RepeatedByDataset repeated_;
+  RepeatedByDataset nearly_repeated_;
 };
 
 }  // namespace
 
-void fail_duplicates(std::vector<Candidate>& candidates, std::vector<IngestNote>& notes) {
-  std::unordered_map<std::string, std::vector<const Candidate*>> of_picture;  // by SHA-256
-  std::map<std::string, Repeated> repeated;                                   // by dataset
-  std::map<std::string, Repeated> nearly_repeated;
-  for (Candidate& candidate : candidates) {
-    if (candidate.record.failure != manifests::Reason::none || candidate.image_sha256.empty()) continue;
-    std::vector<const Candidate*>& earlier = of_picture[candidate.image_sha256];
-    const auto found = std::find_if(earlier.begin(), earlier.end(),
-                                    [&](const Candidate* each) { return is_same_animal(*each, candidate); });
-    if (found == earlier.end()) {
-      const auto near = std::find_if(earlier.begin(), earlier.end(), [&](const Candidate* each) {
-        return is_nearly_same_animal(*each, candidate);
-      });
-      if (near != earlier.end()) {
-        Repeated& here = nearly_repeated[candidate.record.dataset + "/" + candidate.record.split];
-        if (here.count++ == 0)
-          here.first = fmt::format("{} after {}", candidate.record.id, (*near)->record.id);
-      }
-      earlier.push_back(&candidate);
-      continue;
-    }
-    candidate.record.failure = manifests::Reason::duplicate;
-    candidate.record.failure_detail = "it is that of " + (*found)->record.id;
-    Repeated& here = repeated[candidate.record.dataset + "/" + candidate.record.split];
-    if (here.count++ == 0) here.first = candidate.record.id;
+void Duplicates::add(std::size_t index, const Candidate& candidate) {
+  constexpr std::size_t kDigits = 16;
+  if (candidate.record.failure != manifests::Reason::none || candidate.image_sha256.empty()) return;
+  const std::string_view digits = std::string_view(candidate.image_sha256).substr(0, kDigits);
+  std::uint64_t picture = 0;
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), picture, 16);
+  if (error != std::errc() || end != digits.data() + digits.size()) {
+    throw std::invalid_argument("got the digest " + candidate.image_sha256 + ", expected hexadecimal digits");
   }
-  for (const auto& [dataset, each] : repeated) {
-    notes.push_back(
-        {loaders::formats::NoteKind::caution, dataset,
-         fmt::format("duplicates: samples with the picture and the keypoints of an earlier one, which "
-                     "is counted once: {}, first {}",
-                     each.count, each.first)});
+  pictured_.push_back({picture, index});
+}
+
+void Duplicates::fail(CandidateList& candidates, std::vector<IngestNote>& notes) {
+  std::sort(pictured_.begin(), pictured_.end());
+  PictureGroups groups(candidates);
+  std::vector<std::size_t> group;
+  for (std::size_t i = 0; i < pictured_.size(); ++i) {
+    group.push_back(pictured_[i].index);
+    if (i + 1 < pictured_.size() && pictured_[i + 1].picture == pictured_[i].picture) continue;
+    if (group.size() > 1) groups.add(group);
+    group.clear();
   }
-  for (const auto& [dataset, each] : nearly_repeated) {
+  const auto id = [&](std::size_t index) { return candidates.at(index).record.id; };
+  for (const auto& [dataset, each] : groups.repeated()) {
+    notes.push_back({loaders::formats::NoteKind::caution, dataset,
+                     fmt::format("duplicates: samples with the picture and the keypoints of an earlier one, "
+                                 "which is counted once: {}, first {}",
+                                 each.count, id(each.first))});
+  }
+  for (const auto& [dataset, each] : groups.nearly_repeated()) {
     notes.push_back(
         {loaders::formats::NoteKind::caution, dataset,
          fmt::format("samples that look like the same animal in the same picture as an earlier one, as "
-                     "if two people had labelled it; all are kept, so it counts twice: {}, first {}",
-                     each.count, each.first)});
+                     "if two people had labelled it; all are kept, so it counts twice: {}, first {} after {}",
+                     each.count, id(each.first), id(each.of))});
   }
 }
 

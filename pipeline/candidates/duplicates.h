@@ -1,17 +1,36 @@
 // Animals that a pool holds several times: two files of the same labels, or one annotation twice.
 #pragma once
 
+#include <compare>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
 #include <vector>
 
+#include "pipeline/candidates/candidate_list.h"
 #include "pipeline/candidates/ingest.h"
 
 namespace q3d::pipeline::candidates {
 
-// Fails every candidate as `duplicate` whose picture has the bytes of an earlier candidate's and whose
-// visible keypoints, or whose box if it has none, are the same to half a pixel. Candidates of different roles
-// are not compared: a pool may hold an animal's own label and its pseudo label. Needs the pictures' digests.
-// Samples of one picture that look like one animal labelled by two people are kept. Adds notes of both for
-// each dataset.
-void fail_duplicates(std::vector<Candidate>& candidates, std::vector<IngestNote>& notes);
+// Candidates of different roles are not compared: a pool may hold an animal's own label and its pseudo label.
+class Duplicates {
+ public:
+  // Notes a usable candidate with a picture, by the picture's digest. Every candidate must be given, in
+  // order.
+  void add(std::size_t index, const Candidate& candidate);
+
+  // Fails every candidate as `duplicate` whose picture has the bytes of an earlier candidate's and whose
+  // visible keypoints, or whose box if it has none, are the same to half a pixel. Samples of one picture that
+  // look like one animal labelled by two people are kept. Adds notes of both for each dataset. Call it once.
+  void fail(CandidateList& candidates, std::vector<IngestNote>& notes);
+
+ private:
+  struct Pictured {
+    std::uint64_t picture = 0;  // the first digits of its SHA-256
+    std::size_t index = 0;
+    auto operator<=>(const Pictured&) const = default;
+  };
+  std::deque<Pictured> pictured_;
+};
 
 }  // namespace q3d::pipeline::candidates

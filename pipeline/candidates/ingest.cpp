@@ -4,10 +4,17 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <compare>
+#include <deque>
+#include <functional>
+#include <iterator>
 #include <map>
+#include <memory>
 #include <nlohmann/json.hpp>
-#include <set>
+#include <optional>
+#include <span>
 #include <stdexcept>
+#include <utility>
 
 #include "manifests/atomic_file.h"
 #include "manifests/json_parse.h"
@@ -31,15 +38,40 @@ std::string digest_files(const std::vector<std::filesystem::path>& files, manife
   return manifests::sha256(text);
 }
 
-void require_unique_ids(const std::vector<Candidate>& candidates) {
-  std::set<std::string_view> seen;
-  for (const Candidate& candidate : candidates) {
-    if (!seen.insert(candidate.record.id).second) {
-      throw std::runtime_error(fmt::format("the sample id {} occurs twice; ids must be unique within a build",
-                                           candidate.record.id));
-    }
+// Finds ids that occur twice. It holds a hash of 64 bits of every id; ids of one hash are compared
+// themselves.
+class UniqueIds {
+ public:
+  void add(std::size_t index, const std::string& id) {
+    ids_.push_back({std::hash<std::string>()(id), index});
   }
-}
+
+  // Throws std::runtime_error that names the first candidate whose id an earlier one has.
+  void require(const CandidateList& candidates) {
+    std::sort(ids_.begin(), ids_.end());
+    std::optional<std::string> repeated;
+    std::size_t first = candidates.size();  // place of `repeated`
+    for (std::size_t i = 1; i < ids_.size(); ++i) {
+      for (std::size_t j = i; j > 0 && ids_[j - 1].hash == ids_[i].hash && ids_[i].index < first; --j) {
+        std::string id = candidates.at(ids_[i].index).record.id;
+        if (candidates.at(ids_[j - 1].index).record.id != id) continue;
+        repeated = std::move(id);
+        first = ids_[i].index;
+      }
+    }
+    if (!repeated) return;
+    throw std::runtime_error(
+        fmt::format("the sample id {} occurs twice; ids must be unique within a build", *repeated));
+  }
+
+ private:
+  struct Hashed {
+    std::uint64_t hash = 0;
+    std::size_t index = 0;
+    auto operator<=>(const Hashed&) const = default;
+  };
+  std::deque<Hashed> ids_;
+};
 
 // Paths of this machine do not belong into a dataset: equal builds in different folders have equal verdicts.
 std::string without_root(std::string text, const std::filesystem::path& root) {
@@ -67,7 +99,7 @@ void check_role(config::Role role, manifests::SampleRecord& record) {
 
 // A picture that is not there is a failed sample, never a failed build; a mask is then none. A file that is
 // there and cannot be read stops the run.
-void digest_pictures(std::vector<Candidate>& candidates, manifests::DigestCache& digests) {
+void digest_pictures(std::span<Candidate> candidates, manifests::DigestCache& digests) {
   tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t i) {
     Candidate& candidate = candidates[i];
     if (candidate.record.failure != Reason::none || run::interrupted()) return;
@@ -95,49 +127,127 @@ std::map<std::string, std::string> texts_of_terms(const config::BuildConfig& con
   return texts;
 }
 
-std::string digest_labels(const Unit& unit, const std::vector<Candidate>& candidates,
-                          const std::map<std::string, std::string>& terms) {
-  std::map<std::string, std::string> own;
-  for (std::size_t i = unit.first; i < unit.first + unit.count; ++i) {
-    if (const auto found = terms.find(dataset_key(candidates[i].record)); found != terms.end())
-      own.insert(*found);
+// Digests a unit's records, pictures, masks and roles, and the terms of its datasets.
+void digest_unit(const std::vector<Candidate>& candidates, const std::map<std::string, std::string>& terms,
+                 Unit& unit) {
+  std::string text;
+  std::map<std::string, std::string> own_terms;
+  for (const Candidate& candidate : candidates) {
+    text += manifests::record_digest(candidate.record) + ' ' + candidate.image_sha256 + ' ' +
+            candidate.mask_sha256 + ' ';
+    text += std::string(to_string(candidate.role)) + '\n';
+    if (!candidate.finding.empty()) text += candidate.finding + '\n';
+    const auto found = terms.find(dataset_key(candidate.record));
+    if (found != terms.end()) own_terms.insert(*found);
   }
-  return own.empty() ? unit.input_digest
-                     : manifests::sha256(unit.input_digest + '\n' + nlohmann::json(own).dump());
+  unit.input_digest = manifests::sha256(text);
+  unit.label_digest = own_terms.empty()
+                          ? unit.input_digest
+                          : manifests::sha256(unit.input_digest + '\n' + nlohmann::json(own_terms).dump());
 }
 
-std::vector<Unit> cut_units(const std::vector<Candidate>& candidates, const config::BuildConfig& config) {
+std::vector<Unit> cut_units(const CandidateList& candidates, const config::BuildConfig& config) {
   const auto unit_size = static_cast<std::size_t>(config.shards.unit_size);
   const std::map<std::string, std::string> terms = texts_of_terms(config);
-  std::vector<Unit> units;
-  for (std::size_t first = 0; first < candidates.size(); first += unit_size) {
-    Unit unit;
-    unit.index = static_cast<std::int64_t>(units.size());
-    unit.first = first;
-    unit.count = std::min(unit_size, candidates.size() - first);
-    std::string text;
-    for (std::size_t i = first; i < first + unit.count; ++i) {
-      text += manifests::record_digest(candidates[i].record) + ' ' + candidates[i].image_sha256 + ' ' +
-              candidates[i].mask_sha256 + ' ';
-      text += std::string(to_string(candidates[i].role)) + '\n';
-      if (!candidates[i].finding.empty()) text += candidates[i].finding + '\n';
-    }
-    unit.input_digest = manifests::sha256(text);
-    unit.label_digest = digest_labels(unit, candidates, terms);
-    units.push_back(std::move(unit));
-  }
+  std::vector<Unit> units((candidates.size() + unit_size - 1) / unit_size);
+  tbb::parallel_for(std::size_t{0}, units.size(), [&](std::size_t i) {
+    Unit& unit = units[i];
+    unit.index = static_cast<std::int64_t>(i);
+    unit.first = i * unit_size;
+    unit.count = std::min(unit_size, candidates.size() - unit.first);
+    if (!run::interrupted()) digest_unit(candidates.read(unit.first, unit.count), terms, unit);
+  });
+  run::throw_if_interrupted();
   return units;
 }
 
-// Findings of all records; none without a body model.
-std::vector<std::string> check_truth(const config::DatasetConfig& options,
-                                     const device::BodyMeshesLoader& load_bodies,
-                                     loaders::formats::Dataset& dataset) {
-  if (options.body_model.empty() || !load_bodies) return std::vector<std::string>(dataset.records.size());
-  const std::unique_ptr<device::BodyMeshes> bodies = load_bodies(options.body_model);
-  BodyCheck check = check_bodies(*bodies, options.keypoints_3d_of_body, dataset.records);
-  dataset.notes.push_back({loaders::formats::NoteKind::remark, to_note(check)});
-  return std::move(check.findings);
+// What is looked for in all candidates.
+struct Searches {
+  UniqueIds ids;
+  Duplicates duplicates;
+};
+
+// Takes the records of one dataset, part by part, and appends them to the candidates.
+class DatasetIntake {
+ public:
+  // Without `bodies`, records keep what the file says. All references must outlive it.
+  DatasetIntake(const config::DatasetConfig& options, std::unique_ptr<device::BodyMeshes> bodies,
+                manifests::DigestCache& digests, Searches& searches, Ingest& ingest)
+      : options_(options),
+        bodies_(std::move(bodies)),
+        digests_(digests),
+        searches_(searches),
+        ingest_(ingest) {}
+
+  void take(std::vector<manifests::SampleRecord>&& records) {
+    if (ingest_.corrections) apply_corrections(*ingest_.corrections, records);
+    for (auto& record : records) check_role(options_.role, record);
+    if (!bodies_) {
+      std::vector<std::string> findings(records.size());
+      append(std::move(records), std::move(findings));
+      return;
+    }
+    waiting_.insert(waiting_.end(), std::make_move_iterator(records.begin()),
+                    std::make_move_iterator(records.end()));
+    while (const std::size_t count = records_of_one_call(waiting_)) check_and_append(count);
+  }
+
+  // Once all records are through.
+  void finish(loaders::formats::Dataset& dataset) {
+    if (!bodies_) return;
+    check_and_append(waiting_.size());
+    dataset.notes.push_back({loaders::formats::NoteKind::remark, to_note(check_)});
+  }
+
+ private:
+  void check_and_append(std::size_t count) {
+    const auto end = waiting_.begin() + static_cast<std::ptrdiff_t>(count);
+    std::vector<manifests::SampleRecord> records(std::make_move_iterator(waiting_.begin()),
+                                                 std::make_move_iterator(end));
+    waiting_.erase(waiting_.begin(), end);
+    BodyCheck found = check_bodies(*bodies_, options_.keypoints_3d_of_body, records);
+    add(found, check_);
+    append(std::move(records), std::move(found.findings));
+  }
+
+  void append(std::vector<manifests::SampleRecord>&& records, std::vector<std::string>&& findings) {
+    std::vector<Candidate> candidates;
+    candidates.reserve(records.size());
+    for (std::size_t i = 0; i < records.size(); ++i) {
+      candidates.push_back({std::move(records[i]), {}, {}, options_.role, std::move(findings[i])});
+    }
+    digest_pictures(candidates, digests_);
+    const std::size_t first = ingest_.candidates.size();
+    for (std::size_t i = 0; i < candidates.size(); ++i) {
+      searches_.ids.add(first + i, candidates[i].record.id);
+      searches_.duplicates.add(first + i, candidates[i]);
+    }
+    ingest_.candidates.append(candidates);
+  }
+
+  const config::DatasetConfig& options_;
+  std::unique_ptr<device::BodyMeshes> bodies_;
+  manifests::DigestCache& digests_;
+  Searches& searches_;
+  Ingest& ingest_;
+  std::vector<manifests::SampleRecord> waiting_;  // for the body model
+  BodyCheck check_;
+};
+
+void ingest_dataset(const config::DatasetConfig& options, manifests::DigestCache& digests,
+                    const device::BodyMeshesLoader& load_bodies, Searches& searches, Ingest& result) {
+  const bool checks_bodies = !options.body_model.empty() && load_bodies;
+  DatasetIntake intake(options, checks_bodies ? load_bodies(options.body_model) : nullptr, digests, searches,
+                       result);
+  auto [dataset, digest] = stream_dataset(
+      options, digests,
+      [&](std::vector<manifests::SampleRecord>&& records) { intake.take(std::move(records)); });
+  intake.finish(dataset);
+  const std::string name = options.name + "/" + options.split;
+  result.annotation_digests[name] = std::move(digest);
+  result.files.insert(result.files.end(), dataset.files.begin(), dataset.files.end());
+  if (is_rendered(options.root)) result.rendered.insert(name);
+  for (auto& note : dataset.notes) result.notes.push_back({note.kind, name, std::move(note.text)});
 }
 
 }  // namespace
@@ -158,44 +268,50 @@ std::string dataset_key(const manifests::SampleRecord& record) {
   return record.dataset + "/" + record.split;
 }
 
-IngestedDataset read_dataset(const config::DatasetConfig& options, manifests::DigestCache& digests) {
-  run::throw_if_interrupted();
-  loaders::formats::Dataset dataset = load_configured(options);
-  fit_to_pictures(options, dataset);
-  for (auto& record : dataset.records) {
-    record.failure_detail = without_root(std::move(record.failure_detail), options.root);
-  }
+IngestedDataset stream_dataset(const config::DatasetConfig& options, manifests::DigestCache& digests,
+                               const loaders::formats::TakeRecords& take) {
+  PictureFit fit(options);
+  loaders::formats::Dataset dataset =
+      stream_configured(options, [&](std::vector<manifests::SampleRecord>&& records) {
+        run::throw_if_interrupted();
+        fit.fit(records);
+        for (auto& record : records) {
+          record.failure_detail = without_root(std::move(record.failure_detail), options.root);
+        }
+        take(std::move(records));
+      });
+  for (auto& note : fit.notes()) dataset.notes.push_back(std::move(note));
   for (auto& note : dataset.notes) note.text = without_root(std::move(note.text), options.root);
   std::string digest = digest_files(dataset.files, digests);
   return {std::move(dataset), std::move(digest)};
 }
 
+IngestedDataset read_dataset(const config::DatasetConfig& options, manifests::DigestCache& digests) {
+  std::vector<manifests::SampleRecord> records;
+  IngestedDataset read = stream_dataset(options, digests, [&](std::vector<manifests::SampleRecord>&& part) {
+    records.insert(records.end(), std::make_move_iterator(part.begin()), std::make_move_iterator(part.end()));
+  });
+  read.dataset.records = std::move(records);
+  return read;
+}
+
 Ingest ingest(const config::BuildConfig& config, manifests::DigestCache& digests,
-              const device::BodyMeshesLoader& load_bodies) {
+              const device::BodyMeshesLoader& load_bodies, const std::filesystem::path& folder) {
   Ingest result;
+  result.candidates = CandidateList(folder);
   if (!config.corrections.empty()) result.corrections = read_corrections(config.corrections);
+  std::optional<Searches> searches(std::in_place);
   for (const auto& options : config.datasets) {
-    auto [dataset, digest] = read_dataset(options, digests);
-    const std::string name = options.name + "/" + options.split;
-    result.annotation_digests[name] = std::move(digest);
-    result.files.insert(result.files.end(), dataset.files.begin(), dataset.files.end());
-    if (is_rendered(options.root)) result.rendered.insert(name);
-    if (result.corrections) apply_corrections(*result.corrections, dataset.records);
-    for (auto& record : dataset.records) check_role(options.role, record);
-    std::vector<std::string> findings = check_truth(options, load_bodies, dataset);
-    for (std::size_t i = 0; i < dataset.records.size(); ++i) {
-      result.candidates.push_back(
-          {std::move(dataset.records[i]), {}, {}, options.role, std::move(findings[i])});
-    }
-    for (auto& note : dataset.notes) result.notes.push_back({note.kind, name, std::move(note.text)});
+    run::throw_if_interrupted();
+    ingest_dataset(options, digests, load_bodies, *searches, result);
   }
   if (result.corrections) {
     result.notes.push_back(
         {loaders::formats::NoteKind::remark, {}, note_of(*result.corrections, config.corrections)});
   }
-  require_unique_ids(result.candidates);
-  digest_pictures(result.candidates, digests);
-  fail_duplicates(result.candidates, result.notes);
+  searches->ids.require(result.candidates);
+  searches->duplicates.fail(result.candidates, result.notes);
+  searches.reset();  // their memory is needed no more
   digests.save();
   result.units = cut_units(result.candidates, config);
   return result;

@@ -9,30 +9,17 @@
 #include <string>
 #include <vector>
 
+#include "loaders/formats/dataset.h"
 #include "loaders/formats/note.h"
 #include "manifests/digest.h"
 #include "manifests/sample.h"
+#include "pipeline/candidates/candidate_list.h"
 #include "pipeline/candidates/corrections.h"
 #include "pipeline/candidates/veto.h"
 #include "pipeline/config/build_config.h"
 #include "pipeline/device/body_meshes.h"
 
 namespace q3d::pipeline::candidates {
-
-// The reason why a candidate is left out, whatever its prediction.
-struct Exclusion {
-  manifests::Reason reason = manifests::Reason::none;
-  std::string detail;  // for people
-};
-
-struct Candidate {
-  manifests::SampleRecord record;
-  std::string image_sha256;                  // empty when the picture is not there
-  std::string mask_sha256;                   // empty when there is none, or its file is not there
-  config::Role role = config::Role::pseudo;  // its dataset's
-  std::string finding;  // of the check of its body, for people; empty where there is nothing to tell
-  Exclusion exclusion{};
-};
 
 // A fixed run of candidates in ingest order: the grain of resume and of determinism. It becomes one shard.
 struct Unit {
@@ -64,7 +51,7 @@ struct IngestNote {
 };
 
 struct Ingest {
-  std::vector<Candidate> candidates;  // dataset order of the config, then file order
+  CandidateList candidates;  // dataset order of the config, then file order
   std::vector<Unit> units;
   std::map<std::string, std::string> annotation_digests;  // "name/split" -> SHA-256 of its annotation files
   std::vector<std::filesystem::path> files;               // that were read, beside pictures and masks
@@ -82,9 +69,10 @@ struct Ingest {
 // is failed, and so is one that repeats an earlier one (duplicates.h). Throws std::runtime_error for an
 // annotation file that cannot be read, manifests::IoError for a picture or mask that is there and cannot be
 // read, and Interrupted. `load_bodies` is called for datasets with a body model;
-// an empty one leaves their bodies unchecked, for callers that look at pictures alone.
+// an empty one leaves their bodies unchecked, for callers that look at pictures alone. The candidates lie in
+// a file without a name in `folder`.
 Ingest ingest(const config::BuildConfig& config, manifests::DigestCache& digests,
-              const device::BodyMeshesLoader& load_bodies);
+              const device::BodyMeshesLoader& load_bodies, const std::filesystem::path& folder);
 
 // Returns whether the dataset in this folder is part of a world that `sample` rendered. If so, the folder or
 // the one above it holds the world's world.json. Pictures without this mark count as photographs.
@@ -100,5 +88,8 @@ struct IngestedDataset {
   std::string annotations_sha256;
 };
 IngestedDataset read_dataset(const config::DatasetConfig& options, manifests::DigestCache& digests);
+// The same, part by part (loaders::formats::stream_dataset): `dataset` has no records.
+IngestedDataset stream_dataset(const config::DatasetConfig& options, manifests::DigestCache& digests,
+                               const loaders::formats::TakeRecords& take);
 
 }  // namespace q3d::pipeline::candidates

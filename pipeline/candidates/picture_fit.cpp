@@ -10,7 +10,6 @@
 #include <string>
 #include <utility>
 
-#include "loaders/formats/notes.h"
 #include "loaders/pictures/orientation.h"
 #include "loaders/pictures/picture_header.h"
 #include "pipeline/candidates/label_checks.h"
@@ -67,9 +66,10 @@ Headers read_headers(const std::vector<SampleRecord>& records) {
   return headers;
 }
 
-class PictureFit {
+class HeaderFit {
  public:
-  explicit PictureFit(const config::DatasetConfig& options) : options_(options) {}
+  HeaderFit(const config::DatasetConfig& options, loaders::formats::Notes& notes)
+      : options_(options), notes_(notes) {}
 
   void fit(SampleRecord& record, const PictureHeader& header) {
     const Size stored{header.width_px, header.height_px};
@@ -88,8 +88,6 @@ class PictureFit {
       notes_.count("visible keypoints outside the picture are kept", record.id);
     }
   }
-
-  std::vector<loaders::formats::Note> notes() const { return notes_.list(); }
 
  private:
   // Refuses a picture by its header, before anything takes memory for its pixels.
@@ -174,19 +172,18 @@ class PictureFit {
   }
 
   const config::DatasetConfig& options_;
-  loaders::formats::Notes notes_;
+  loaders::formats::Notes& notes_;
 };
 
 }  // namespace
 
-void fit_to_pictures(const config::DatasetConfig& options, loaders::formats::Dataset& dataset) {
-  const Headers headers = read_headers(dataset.records);
-  PictureFit fit(options);
-  for (SampleRecord& record : dataset.records) {
+void PictureFit::fit(std::vector<SampleRecord>& records) {
+  const Headers headers = read_headers(records);
+  HeaderFit fit(options_, notes_);
+  for (SampleRecord& record : records) {
     if (record.failure != Reason::none || record.image_path.empty()) continue;
     if (const auto& header = headers.at(record.image_path)) fit.fit(record, *header);
   }
-  for (loaders::formats::Note& note : fit.notes()) dataset.notes.push_back(std::move(note));
 }
 
 }  // namespace q3d::pipeline::candidates

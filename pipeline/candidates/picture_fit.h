@@ -1,7 +1,10 @@
 // Compares what annotation files say of their pictures with the pictures themselves.
 #pragma once
 
-#include "loaders/formats/dataset.h"
+#include <vector>
+
+#include "loaders/formats/notes.h"
+#include "manifests/sample.h"
 #include "pipeline/config/build_config.h"
 
 namespace q3d::pipeline::candidates {
@@ -21,6 +24,18 @@ namespace q3d::pipeline::candidates {
 // and how many have keypoints outside their picture. Records of pictures without a readable header stay as
 // they are: decoding tells what is wrong. Throws manifests::IoError for a picture that is there and cannot be
 // read, and Interrupted.
-void fit_to_pictures(const config::DatasetConfig& options, loaders::formats::Dataset& dataset);
+class PictureFit {
+ public:
+  // `options` must outlive it.
+  explicit PictureFit(const config::DatasetConfig& options) : options_(options) {}
+
+  void fit(std::vector<manifests::SampleRecord>& records);
+  // Of all records so far.
+  std::vector<loaders::formats::Note> notes() const { return notes_.list(); }
+
+ private:
+  const config::DatasetConfig& options_;
+  loaders::formats::Notes notes_;
+};
 
 }  // namespace q3d::pipeline::candidates

@@ -6,7 +6,6 @@
 
 #include <cmath>
 
-#include "manifests/csv.h"
 #include "manifests/digest.h"
 #include "manifests/enumerators.h"
 #include "manifests/sealed_json.h"
@@ -17,7 +16,6 @@
 namespace q3d::pipeline::dataset {
 namespace {
 
-using manifests::csv_cell;
 using manifests::Verdict;
 using nlohmann::ordered_json;
 
@@ -27,88 +25,6 @@ ordered_json counts_json(const Counts& counts) {
           {"refined", counts.refined},
           {"discarded", counts.discarded},
           {"failed", counts.failed}};
-}
-
-// Counts and mean errors by any label of the candidates.
-class Statistics {
- public:
-  void add(const std::string& label, const manifests::Judgement& judgement) {
-    Group& group = groups_[label.empty() ? "unknown" : label];
-    group.counts.add(judgement.verdict);
-    if (manifests::is_kept(judgement.verdict)) {
-      group.initial.add(judgement.initial_error);
-      group.final.add(judgement.final_error);
-    }
-  }
-  ordered_json to_json() const {
-    ordered_json object = ordered_json::object();
-    for (const auto& [label, group] : groups_) {
-      ordered_json entry = counts_json(group.counts);
-      if (group.initial.count > 0) entry["mean_initial_error_of_kept"] = group.initial.mean();
-      if (group.final.count > 0) entry["mean_final_error_of_kept"] = group.final.mean();
-      object[label] = std::move(entry);
-    }
-    return object;
-  }
-
- private:
-  struct Mean {  // of the errors that were computed
-    double sum = 0.0;
-    std::int64_t count = 0;
-    void add(double error) {
-      if (std::isnan(error)) return;
-      sum += error;
-      ++count;
-    }
-    double mean() const { return sum / static_cast<double>(count); }
-  };
-  struct Group {
-    Counts counts;
-    Mean initial;
-    Mean final;
-  };
-  std::map<std::string, Group> groups_;
-};
-
-ordered_json statistics(const candidates::Ingest& ingest,
-                        const std::vector<manifests::Judgement>& judgements) {
-  Statistics all;
-  Statistics by_dataset;
-  Statistics by_family;
-  Statistics by_species;
-  std::map<std::string, std::int64_t> reasons;
-  for (std::size_t i = 0; i < judgements.size(); ++i) {
-    const manifests::SampleRecord& record = ingest.candidates[i].record;
-    all.add("all", judgements[i]);
-    by_dataset.add(record.dataset + "/" + record.split, judgements[i]);
-    by_family.add(std::string(manifests::to_string(record.family)), judgements[i]);
-    by_species.add(record.species, judgements[i]);
-    if (judgements[i].reason != manifests::Reason::none) {
-      ++reasons[std::string(manifests::to_string(judgements[i].reason))];
-    }
-  }
-  ordered_json object = all.to_json();
-  object["reasons"] = reasons;
-  object["by_dataset"] = by_dataset.to_json();
-  object["by_family"] = by_family.to_json();
-  object["by_species"] = by_species.to_json();
-  return object;
-}
-
-ordered_json count_labels(const candidates::Ingest& ingest,
-                          const std::vector<manifests::Judgement>& judgements) {
-  using manifests::LabelKind;
-  ordered_json labels = ordered_json::object();
-  for (const LabelKind kind :
-       {LabelKind::truth, LabelKind::retained, LabelKind::refined, LabelKind::two_d_only}) {
-    std::int64_t count = 0;
-    for (std::size_t i = 0; i < judgements.size(); ++i) {
-      count += manifests::is_kept(judgements[i].verdict) &&
-               config::label_kind(ingest.candidates[i].role, judgements[i].verdict) == kind;
-    }
-    labels[std::string(manifests::to_string(kind))] = count;
-  }
-  return labels;
 }
 
 // Those of each dataset with pseudo labels; null where there is none.
@@ -172,20 +88,6 @@ ordered_json describe_datasets(const config::BuildConfig& config) {
   return datasets;
 }
 
-// Shortest text that reads back as the same number; empty for NaN.
-std::string number(double value) {
-  return std::isnan(value) ? std::string() : fmt::format("{}", value);
-}
-
-// The cells of the trust scores, each after its comma.
-std::string trust_cells(const manifests::TrustScores& trust) {
-  std::string cells;
-  for (const manifests::TrustColumn& column : manifests::kTrustColumns) {
-    cells += "," + number(trust.*column.score);
-  }
-  return cells;
-}
-
 }  // namespace
 
 void Counts::add(Verdict verdict) {
@@ -204,6 +106,66 @@ void Counts::add(Verdict verdict) {
       ++failed;
       break;
   }
+}
+
+void VerdictBooks::Mean::add(double error) {
+  if (std::isnan(error)) return;
+  sum += error;
+  ++count;
+}
+
+void VerdictBooks::Group::add(const manifests::Judgement& judgement) {
+  counts.add(judgement.verdict);
+  if (!manifests::is_kept(judgement.verdict)) return;
+  initial.add(judgement.initial_error);
+  final.add(judgement.final_error);
+}
+
+void VerdictBooks::add(const candidates::Candidate& candidate, const manifests::Judgement& judgement) {
+  const manifests::SampleRecord& record = candidate.record;
+  const auto in = [](Groups& groups, const std::string& label) -> Group& {
+    return groups[label.empty() ? "unknown" : label];
+  };
+  counts_.add(judgement.verdict);
+  all_.add(judgement);
+  in(by_dataset_, candidates::dataset_key(record)).add(judgement);
+  in(by_family_, std::string(manifests::to_string(record.family))).add(judgement);
+  in(by_species_, record.species).add(judgement);
+  if (judgement.reason != manifests::Reason::none) {
+    ++reasons_[std::string(manifests::to_string(judgement.reason))];
+  }
+  if (manifests::is_kept(judgement.verdict)) ++labels_[config::label_kind(candidate.role, judgement.verdict)];
+}
+
+ordered_json VerdictBooks::to_json(const Groups& groups) {
+  ordered_json object = ordered_json::object();
+  for (const auto& [label, group] : groups) {
+    ordered_json entry = counts_json(group.counts);
+    if (group.initial.count > 0) entry["mean_initial_error_of_kept"] = group.initial.value();
+    if (group.final.count > 0) entry["mean_final_error_of_kept"] = group.final.value();
+    object[label] = std::move(entry);
+  }
+  return object;
+}
+
+ordered_json VerdictBooks::statistics_json() const {
+  ordered_json object = counts_.candidates == 0 ? ordered_json::object() : to_json({{"all", all_}});
+  object["reasons"] = reasons_;
+  object["by_dataset"] = to_json(by_dataset_);
+  object["by_family"] = to_json(by_family_);
+  object["by_species"] = to_json(by_species_);
+  return object;
+}
+
+ordered_json VerdictBooks::labels_json() const {
+  using manifests::LabelKind;
+  ordered_json labels = ordered_json::object();
+  for (const LabelKind kind :
+       {LabelKind::truth, LabelKind::retained, LabelKind::refined, LabelKind::two_d_only}) {
+    const auto found = labels_.find(kind);
+    labels[std::string(manifests::to_string(kind))] = found == labels_.end() ? 0 : found->second;
+  }
+  return labels;
 }
 
 std::map<std::string, manifests::DatasetTerms> terms_of_datasets(const config::BuildConfig& config) {
@@ -230,10 +192,8 @@ ordered_json notes_json(const std::vector<candidates::IngestNote>& notes) {
   return list;
 }
 
-std::string dataset_json(const DatasetInputs& inputs, const std::vector<manifests::Judgement>& judgements,
+std::string dataset_json(const DatasetInputs& inputs, const VerdictBooks& books,
                          const std::vector<ShardEntry>& shards, const std::string& verdicts_sha256) {
-  Counts counts;
-  for (const auto& judgement : judgements) counts.add(judgement.verdict);
   ordered_json shard_list = ordered_json::array();
   for (const ShardEntry& shard : shards) {
     shard_list.push_back({{"file", shard.file},
@@ -250,13 +210,13 @@ std::string dataset_json(const DatasetInputs& inputs, const std::vector<manifest
                                  {"key", keys.dataset},
                                  {"content_id", content_id(shards)},
                                  {"toolkit", run::version()},
-                                 {"counts", counts_json(counts)},
-                                 {"labels", count_labels(*inputs.ingest, judgements)},
+                                 {"counts", counts_json(books.counts())},
+                                 {"labels", books.labels_json()},
                                  {"datasets", describe_datasets(*inputs.config)},
                                  {"profile", inputs.config->profile},
                                  {"thresholds", describe_thresholds(inputs)},
                                  {"guards", describe_guards(inputs)},
-                                 {"statistics", statistics(*inputs.ingest, judgements)},
+                                 {"statistics", books.statistics_json()},
                                  {"notes", notes_json(inputs.ingest->notes)},
                                  {"warnings", to_json(inputs.warnings)},
                                  {"provenance",
@@ -279,33 +239,6 @@ std::string dataset_json(const DatasetInputs& inputs, const std::vector<manifest
                                  {"verdicts", {{"file", "verdicts.csv"}, {"sha256", verdicts_sha256}}},
                                  {"shards", shard_list}};
   return manifests::seal_json(document);
-}
-
-std::string verdicts_csv(const candidates::Ingest& ingest,
-                         const std::vector<manifests::Judgement>& judgements) {
-  std::string text = "id,verdict,reason,initial_error,final_error,gain,iterations,best_iteration";
-  for (const manifests::TrustColumn& column : manifests::kTrustColumns) text.append(",").append(column.name);
-  text += ",dataset,split,source,species,family,shard,row,image_sha256,detail\n";
-  for (const candidates::Unit& unit : ingest.units) {
-    std::int64_t row = 0;
-    for (std::size_t i = unit.first; i < unit.first + unit.count; ++i) {
-      const manifests::SampleRecord& record = ingest.candidates[i].record;
-      const manifests::Judgement& judgement = judgements[i];
-      const bool kept = manifests::is_kept(judgement.verdict);
-      const bool judged = !std::isnan(judgement.initial_error);
-      text += fmt::format(
-          "{},{},{},{},{},{},{},{}{},{},{},{},{},{},{},{},{},{}\n", csv_cell(record.id),
-          manifests::to_string(judgement.verdict), manifests::to_string(judgement.reason),
-          number(judgement.initial_error), number(judgement.final_error), number(judgement.gain),
-          judged ? std::to_string(judgement.iterations) : "",
-          judged ? std::to_string(judgement.best_iteration) : "", trust_cells(judgement.trust),
-          csv_cell(record.dataset), csv_cell(record.split), csv_cell(record.source), csv_cell(record.species),
-          manifests::to_string(record.family), kept ? std::to_string(unit.index) : "",
-          kept ? std::to_string(row) : "", ingest.candidates[i].image_sha256, csv_cell(judgement.detail));
-      if (kept) ++row;
-    }
-  }
-  return text;
 }
 
 }  // namespace q3d::pipeline::dataset

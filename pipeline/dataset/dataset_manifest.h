@@ -86,6 +86,41 @@ std::map<std::string, manifests::DatasetTerms> terms_of_datasets(const config::B
 // SHA-256 over the shards' digests, one a line, in unit order.
 std::string content_id(const std::vector<ShardEntry>& shards);
 
+// What dataset.json says of the candidates and their verdicts.
+class VerdictBooks {
+ public:
+  // In the order of the candidates.
+  void add(const candidates::Candidate& candidate, const manifests::Judgement& judgement);
+
+  const Counts& counts() const { return counts_; }
+  nlohmann::ordered_json labels_json() const;
+  nlohmann::ordered_json statistics_json() const;
+
+ private:
+  struct Mean {  // of the errors that were computed
+    double sum = 0.0;
+    std::int64_t count = 0;
+    void add(double error);
+    double value() const { return sum / static_cast<double>(count); }
+  };
+  struct Group {
+    Counts counts;
+    Mean initial;
+    Mean final;
+    void add(const manifests::Judgement& judgement);
+  };
+  using Groups = std::map<std::string, Group>;
+  static nlohmann::ordered_json to_json(const Groups& groups);
+
+  Counts counts_;
+  std::map<manifests::LabelKind, std::int64_t> labels_;
+  std::map<std::string, std::int64_t> reasons_;
+  Group all_;
+  Groups by_dataset_;
+  Groups by_family_;
+  Groups by_species_;
+};
+
 struct DatasetInputs {
   const config::BuildConfig* config = nullptr;
   const config::JudgingRules* rules = nullptr;
@@ -101,13 +136,8 @@ nlohmann::ordered_json notes_json(const std::vector<candidates::IngestNote>& not
 
 // Text of dataset.json, which ends with a digest over itself (manifests/sealed_json.h). It has no time, host
 // or absolute path of its own, so equal builds give equal bytes.
-std::string dataset_json(const DatasetInputs& inputs, const std::vector<manifests::Judgement>& judgements,
+std::string dataset_json(const DatasetInputs& inputs, const VerdictBooks& books,
                          const std::vector<ShardEntry>& shards, const std::string& verdicts_sha256);
-
-// Text of verdicts.csv: a header and one line a candidate in ingest order. Shard and row are those of the
-// kept ones; a trust score that was not measured is an empty cell.
-std::string verdicts_csv(const candidates::Ingest& ingest,
-                         const std::vector<manifests::Judgement>& judgements);
 
 // Reads dataset.json of a dataset's folder, or of the newest one (`latest`) of an output folder. Throws
 // std::runtime_error that names the file, what was found and what was expected, also for a name that is no

@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <map>
+#include <utility>
+
 #include "pipeline/leakage/leakage.h"
 #include "pipeline/leakage/leakage_lists.h"
 
@@ -17,14 +20,13 @@ void leave_out_leaks(const config::BuildConfig& config, manifests::DigestCache& 
   write_leakage_lists(out, report, ingest);
   std::size_t others = 0;
   for (const Leak& leak : report.leaks) {
-    candidates::Candidate& candidate = ingest.candidates[leak.candidate];
-    if (candidate.role != config::Role::pseudo) {
+    if (ingest.candidates.at(leak.candidate).role != config::Role::pseudo) {
       ++others;
       continue;
     }
-    candidate.exclusion = {Reason::in_test_split,
-                           fmt::format("its picture is that of {} ({}: {})", leak.test_id,
-                                       to_string(leak.evidence), leak.detail)};
+    ingest.candidates.exclude(leak.candidate, {Reason::in_test_split,
+                                               fmt::format("its picture is that of {} ({}: {})", leak.test_id,
+                                                           to_string(leak.evidence), leak.detail)});
     ++report.summary.excluded;
   }
   const auto note = [&](std::string text) {
@@ -52,12 +54,13 @@ void leave_out_leaks(const config::BuildConfig& config, manifests::DigestCache& 
 void apply_veto(const std::filesystem::path& file, candidates::Ingest& ingest) {
   if (file.empty()) return;
   candidates::Veto& veto = ingest.veto.emplace(candidates::read_veto(file));
-  for (candidates::Candidate& candidate : ingest.candidates) {
+  std::map<std::size_t, candidates::Exclusion> vetoed;
+  ingest.candidates.for_each([&](std::size_t i, const candidates::Candidate& candidate) {
     const auto found = veto.reasons.find(candidate.record.id);
-    if (found == veto.reasons.end()) continue;
-    candidate.exclusion = {Reason::vetoed, found->second};
-    ++veto.matched;
-  }
+    if (found != veto.reasons.end()) vetoed[i] = {Reason::vetoed, found->second};
+  });
+  for (auto& [index, exclusion] : vetoed) ingest.candidates.exclude(index, std::move(exclusion));
+  veto.matched = vetoed.size();
   if (veto.matched < veto.reasons.size()) {
     ingest.notes.push_back(
         {loaders::formats::NoteKind::caution,
@@ -68,15 +71,17 @@ void apply_veto(const std::filesystem::path& file, candidates::Ingest& ingest) {
 }
 
 // An exclusion changes a unit's labels, not its predictions.
-std::string label_digest(const candidates::Unit& unit, const std::vector<candidates::Candidate>& candidates) {
-  std::string text;
-  for (std::size_t i = unit.first; i < unit.first + unit.count; ++i) {
-    const candidates::Exclusion& exclusion = candidates[i].exclusion;
-    if (exclusion.reason == Reason::none) continue;
-    text +=
-        fmt::format("{} {} {}\n", i - unit.first, manifests::to_string(exclusion.reason), exclusion.detail);
+void digest_exclusions(candidates::Ingest& ingest) {
+  auto next = ingest.candidates.exclusions().begin();
+  const auto end = ingest.candidates.exclusions().end();
+  for (candidates::Unit& unit : ingest.units) {
+    std::string text;
+    for (; next != end && next->first < unit.first + unit.count; ++next) {
+      text += fmt::format("{} {} {}\n", next->first - unit.first, manifests::to_string(next->second.reason),
+                          next->second.detail);
+    }
+    if (!text.empty()) unit.label_digest = manifests::sha256(unit.label_digest + '\n' + text);
   }
-  return text.empty() ? unit.label_digest : manifests::sha256(unit.label_digest + '\n' + text);
 }
 
 }  // namespace
@@ -86,7 +91,7 @@ void leave_out(const config::BuildConfig& config, manifests::DigestCache& digest
   leave_out_leaks(config, digests, out, quiet, ingest);
   apply_veto(config.veto, ingest);
   digests.save();
-  for (candidates::Unit& unit : ingest.units) unit.label_digest = label_digest(unit, ingest.candidates);
+  digest_exclusions(ingest);
 }
 
 }  // namespace q3d::pipeline::leakage

@@ -182,11 +182,10 @@ LeakageReport find_leaks(const config::LeakageConfig& config, const candidates::
   Pictures pictures;
   constexpr std::size_t kNone = static_cast<std::size_t>(-1);
   std::vector<std::size_t> picture_of(pool.candidates.size(), kNone);
-  for (std::size_t i = 0; i < pool.candidates.size(); ++i) {
-    const candidates::Candidate& candidate = pool.candidates[i];
+  pool.candidates.for_each([&](std::size_t i, const candidates::Candidate& candidate) {
     if (!candidate.image_sha256.empty())
       picture_of[i] = pictures.add(i, candidate.record, candidate.image_sha256);
-  }
+  });
   report.pool_pictures = pictures.list.size();
 
   PictureHashes hashes(cache_folder / "picture_hashes.txt");

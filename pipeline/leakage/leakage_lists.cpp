@@ -16,7 +16,7 @@ using nlohmann::ordered_json;
 std::string leaks_csv(const LeakageReport& report, const candidates::Ingest& pool) {
   std::string text = "id,test_id,evidence,detail,role\n";
   for (const Leak& leak : report.leaks) {
-    const candidates::Candidate& candidate = pool.candidates[leak.candidate];
+    const candidates::Candidate candidate = pool.candidates.at(leak.candidate);
     text += fmt::format("{},{},{},{},{}\n", csv_cell(candidate.record.id), csv_cell(leak.test_id),
                         to_string(leak.evidence), csv_cell(leak.detail), to_string(candidate.role));
   }
@@ -27,7 +27,7 @@ std::string duplicates_csv(const LeakageReport& report, const candidates::Ingest
   std::string text = "group,id\n";
   for (std::size_t i = 0; i < report.groups.size(); ++i) {
     for (const std::size_t sample : report.groups[i]) {
-      text += fmt::format("{},{}\n", i, csv_cell(pool.candidates[sample].record.id));
+      text += fmt::format("{},{}\n", i, csv_cell(pool.candidates.at(sample).record.id));
     }
   }
   return text;
@@ -36,7 +36,7 @@ std::string duplicates_csv(const LeakageReport& report, const candidates::Ingest
 ordered_json leakage_json(const LeakageReport& report, const candidates::Ingest& pool) {
   ordered_json leaks = ordered_json::array();
   for (const Leak& leak : report.leaks) {
-    const candidates::Candidate& candidate = pool.candidates[leak.candidate];
+    const candidates::Candidate candidate = pool.candidates.at(leak.candidate);
     leaks.push_back({{"id", candidate.record.id},
                      {"test_id", leak.test_id},
                      {"evidence", to_string(leak.evidence)},
@@ -46,7 +46,7 @@ ordered_json leakage_json(const LeakageReport& report, const candidates::Ingest&
   ordered_json groups = ordered_json::array();
   for (const auto& group : report.groups) {
     ordered_json ids = ordered_json::array();
-    for (const std::size_t sample : group) ids.push_back(pool.candidates[sample].record.id);
+    for (const std::size_t sample : group) ids.push_back(pool.candidates.at(sample).record.id);
     groups.push_back(std::move(ids));
   }
   return {{"candidates", pool.candidates.size()},

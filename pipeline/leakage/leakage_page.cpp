@@ -77,8 +77,9 @@ std::vector<Row> leak_rows(const LeakageReport& report, const candidates::Ingest
   std::vector<Row> rows;
   std::string before;
   for (const Leak& leak : report.leaks) {
-    const manifests::SampleRecord& record = pool.candidates[leak.candidate].record;
-    if (record.image_path == before || rows.size() == kMaxPairs) continue;
+    if (rows.size() == kMaxPairs) break;
+    const manifests::SampleRecord record = pool.candidates.at(leak.candidate).record;
+    if (record.image_path == before) continue;
     before = record.image_path;
     rows.push_back({fmt::format("{}: {}", to_string(leak.evidence), leak.detail),
                     {{record.image_path, record.id}, {leak.test_path, leak.test_id}}});
@@ -93,7 +94,7 @@ std::vector<Row> group_rows(const LeakageReport& report, const candidates::Inges
     Row& row = rows.emplace_back();
     row.why = fmt::format("{} pictures", group.size());
     for (std::size_t i = 0; i < std::min(group.size(), kMaxOfGroup); ++i) {
-      const manifests::SampleRecord& record = pool.candidates[group[i]].record;
+      const manifests::SampleRecord record = pool.candidates.at(group[i]).record;
       row.figures.push_back({record.image_path, record.id});
     }
   }

@@ -23,7 +23,7 @@ LeakageRunSummary run_leakage(const config::BuildConfig& config, const run::RunO
   const manifests::FolderLock lock(options.out);
   manifests::remove_temporaries(options.out);  // what a run that was killed left
   manifests::DigestCache digests(options.out / "digests.txt");
-  const candidates::Ingest pool = candidates::ingest(config, digests, /*load_bodies=*/{});
+  const candidates::Ingest pool = candidates::ingest(config, digests, /*load_bodies=*/{}, options.out);
   const LeakageReport report =
       find_leaks(config.leakage.value_or(config::LeakageConfig{}), pool, digests, options.out, options.quiet);
   write_leakage_lists(options.out, report, pool);

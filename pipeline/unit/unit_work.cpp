@@ -19,7 +19,8 @@ void set_candidates(UnitWork& work, std::span<const candidates::Candidate> candi
 std::shared_ptr<UnitWork> open_unit(const candidates::Ingest& ingest, std::int64_t index) {
   auto work = std::make_shared<UnitWork>();
   work->unit = &ingest.units[static_cast<std::size_t>(index)];
-  set_candidates(*work, std::span(ingest.candidates).subspan(work->unit->first, work->unit->count));
+  work->own_candidates = ingest.candidates.read(work->unit->first, work->unit->count);
+  set_candidates(*work, work->own_candidates);
   return work;
 }
 

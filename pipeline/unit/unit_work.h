@@ -65,6 +65,7 @@ struct DecodedSample {
 
 struct UnitWork {
   const candidates::Unit* unit = nullptr;
+  std::vector<candidates::Candidate> own_candidates;  // what the next member spans, in an item of open_unit()
   std::span<const candidates::Candidate> candidates;  // the unit's own; set_candidates
   std::vector<device::CropKeypoints> keypoints;       // by position: the annotated ones, in the crop
 
@@ -95,7 +96,8 @@ struct UnitWork {
 // failed record are zeros.
 void set_candidates(UnitWork& work, std::span<const candidates::Candidate> candidates);
 
-// Returns a new item for one unit of the pool, with its candidates set. `ingest` must outlive it.
+// Returns a new item for one unit of the pool, with its candidates read and set. `ingest` must outlive it.
+// Throws manifests::IoError.
 std::shared_ptr<UnitWork> open_unit(const candidates::Ingest& ingest, std::int64_t index);
 
 // Sets work.predicted and computes work.errors. Needs the candidates.

@@ -4,9 +4,12 @@
 
 #include <filesystem>
 #include <fstream>
-#include <stdexcept>
+#include <optional>
+#include <span>
 #include <string>
+#include <vector>
 
+#include "manifests/next_field.h"
 #include "tests/support/paths.h"
 
 namespace q3d::pipeline::build {
@@ -26,18 +29,33 @@ class FileStamps : public ::testing::Test {
   testing::ScratchDir scratch_;
 };
 
-TEST_F(FileStamps, AreTheSameAfterText) {
-  const auto files = stamp_files({file("b with a space"), file("a"), (scratch_.path() / "gone").string()});
-  ASSERT_EQ(files.size(), 3U);
-  const auto text = to_text(files);
-  ASSERT_TRUE(text);
-  const auto read = stamps_from_text(*text);
-  ASSERT_EQ(read.size(), 3U);
-  for (std::size_t i = 0; i < read.size(); ++i) {
-    EXPECT_EQ(read[i].path, files[i].path);
-    EXPECT_EQ(read[i].stamp, files[i].stamp) << files[i].path;
+// The files of a text of lines; nothing if one of them is no such line.
+std::optional<std::vector<StampedFile>> read_text(std::string_view text) {
+  StampReader reader;
+  std::vector<StampedFile> files;
+  while (!text.empty()) {
+    if (!reader.read(manifests::next_field(text, '\n'), files)) return std::nullopt;
   }
-  EXPECT_TRUE(have_stamps(read));
+  return files;
+}
+
+TEST_F(FileStamps, AreTheSameAfterText) {
+  const auto files =
+      stamp_files({file("a/b with a space"), file("a/c"), (scratch_.path() / "a/gone").string(), file("d"),
+                   file("a/e"), scratch_.path().string(), "no folder"});
+  StampWriter writer;
+  std::string text;
+  ASSERT_TRUE(writer.append(std::span(files).first(2), text));
+  ASSERT_TRUE(writer.append(std::span(files).subspan(2), text));
+  EXPECT_EQ(text.find("/a/\n"), text.find("/a/\n+")) << "the first folder stands once for its files";
+  const auto read = read_text(text);
+  ASSERT_TRUE(read);
+  ASSERT_EQ(read->size(), files.size());
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    EXPECT_EQ((*read)[i].path, files[i].path);
+    EXPECT_EQ((*read)[i].stamp, files[i].stamp) << files[i].path;
+  }
+  EXPECT_TRUE(have_stamps(*read));
 }
 
 TEST_F(FileStamps, ChangeWithTheFile) {
@@ -54,12 +72,13 @@ TEST_F(FileStamps, ChangeWithTheFile) {
 }
 
 TEST_F(FileStamps, OfANameWithALineFeedHaveNoText) {
-  EXPECT_FALSE(to_text(stamp_files({file("a\nb")})));
+  std::string text;
+  EXPECT_FALSE(StampWriter().append(stamp_files({file("a\nb")}), text));
 }
 
 TEST_F(FileStamps, OtherTextIsRefused) {
-  for (const std::string text : {"1 2 3\n", "x 1 2 3 4 path\n", " \n"}) {
-    EXPECT_THROW(stamps_from_text(text), std::invalid_argument) << text;
+  for (const std::string text : {"+ 1 2 3\n", "+ x 1 2 3 4 path\n", " \n", "* 1\n", "path\n"}) {
+    EXPECT_FALSE(read_text(text)) << text;
   }
 }
 

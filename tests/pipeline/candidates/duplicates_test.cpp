@@ -3,13 +3,16 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/support/paths.h"
+
 namespace q3d::pipeline::candidates {
 namespace {
 
 using manifests::Reason;
 using ::testing::HasSubstr;
 
-Candidate candidate(const std::string& id, double x_px = 10.0, const std::string& sha256 = "a") {
+Candidate candidate(const std::string& id, double x_px = 10.0,
+                    const std::string& sha256 = std::string(64, 'a')) {
   Candidate made;
   made.record.id = id;
   made.record.dataset = "lab";
@@ -19,11 +22,16 @@ Candidate candidate(const std::string& id, double x_px = 10.0, const std::string
   return made;
 }
 
-std::vector<Reason> reasons(std::vector<Candidate> candidates, std::vector<IngestNote>* notes = nullptr) {
+std::vector<Reason> reasons(const std::vector<Candidate>& pool, std::vector<IngestNote>* notes = nullptr) {
+  const testing::ScratchDir scratch;
+  CandidateList candidates(scratch.path());
+  candidates.append(pool);
   std::vector<IngestNote> own;
-  fail_duplicates(candidates, notes == nullptr ? own : *notes);
+  Duplicates duplicates;
+  for (std::size_t i = 0; i < pool.size(); ++i) duplicates.add(i, pool[i]);
+  duplicates.fail(candidates, notes == nullptr ? own : *notes);
   std::vector<Reason> all;
-  for (const Candidate& each : candidates) all.push_back(each.record.failure);
+  for (const Candidate& each : candidates.read(0, candidates.size())) all.push_back(each.record.failure);
   return all;
 }
 
@@ -38,9 +46,24 @@ TEST(Duplicates, the_first_of_each_is_kept) {
   EXPECT_THAT(notes[0].text, HasSubstr(": 2, first 2"));
 }
 
+TEST(Duplicates, notes_name_the_first_in_order_whatever_the_pictures) {
+  const auto of = [](char digit) { return std::string(64, digit); };
+  std::vector<IngestNote> notes;
+  // The picture of the first repeated candidate has the larger digest, and one digest begins like another.
+  const std::string like_b = std::string(32, 'b') + std::string(32, 'c');
+  EXPECT_EQ(
+      reasons({candidate("1", 10.0, of('b')), candidate("2", 10.0, of('a')), candidate("3", 10.0, of('b')),
+               candidate("4", 10.0, of('a')), candidate("5", 10.0, like_b)},
+              &notes),
+      (std::vector{Reason::none, Reason::none, Reason::duplicate, Reason::duplicate, Reason::none}));
+  ASSERT_EQ(notes.size(), 1U);
+  EXPECT_THAT(notes[0].text, HasSubstr(": 2, first 3"));
+}
+
 TEST(Duplicates, other_animals_are_no_duplicates) {
   EXPECT_EQ(reasons({candidate("1"), candidate("2", 10.6)}), (std::vector{Reason::none, Reason::none}));
-  EXPECT_EQ(reasons({candidate("1"), candidate("2", 10.0, "b")}), (std::vector{Reason::none, Reason::none}));
+  EXPECT_EQ(reasons({candidate("1"), candidate("2", 10.0, std::string(64, 'b'))}),
+            (std::vector{Reason::none, Reason::none}));
   Candidate hidden = candidate("2");
   hidden.record.keypoints[5] = {1.0, 1.0, 2.0F, 1.0F};
   EXPECT_EQ(reasons({candidate("1"), hidden}), (std::vector{Reason::none, Reason::none}));

@@ -36,7 +36,7 @@ struct Inputs {
     dataset.format = "prima";
     dataset.split = "train";
     ingest.annotation_digests["a/train"] = "digest";
-    ingest.candidates.resize(3);
+    ingest.candidates.append(std::vector<candidates::Candidate>(3));
     ingest.units = {{0, 0, 2, "first", "first"}, {1, 2, 1, "second", "second without one"}};
     limits().tau_low = 0.125;
     limits().tau_high = 0.25;
