@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <charconv>
 #include <cmath>
 #include <cstdint>
@@ -39,22 +40,25 @@ struct Animal {
   int orientation = 1;
   manifests::Box box;
   manifests::Keypoints keypoints;
-  bool has_keypoints = false;
+  std::uint32_t visible = 0;  // a bit for each visible keypoint
 
   Animal(std::size_t place, const Candidate& candidate)
       : index(place),
         role(candidate.role),
         orientation(candidate.record.orientation),
         box(candidate.record.box),
-        keypoints(candidate.record.keypoints),
-        has_keypoints(std::any_of(keypoints.begin(), keypoints.end(),
-                                  [](const Keypoint& point) { return point.weight > 0.0F; })) {}
+        keypoints(candidate.record.keypoints) {
+    static_assert(manifests::kNumKeypoints <= 32);
+    for (std::size_t i = 0; i < keypoints.size(); ++i) {
+      if (keypoints[i].weight > 0.0F) visible |= std::uint32_t{1} << i;
+    }
+  }
 };
 
 // Records without keypoints (photographs) are the same animal if they have the same box.
 bool is_same_animal(const Animal& a, const Animal& b) {
-  if (!a.has_keypoints && !is_same_box(a.box, b.box)) return false;
-  return a.role == b.role && a.orientation == b.orientation &&
+  if (a.visible == 0 && !is_same_box(a.box, b.box)) return false;
+  return a.visible == b.visible && a.role == b.role && a.orientation == b.orientation &&
          std::equal(a.keypoints.begin(), a.keypoints.end(), b.keypoints.begin(), is_same_point);
 }
 
@@ -64,21 +68,22 @@ bool is_nearly_same_animal(const Animal& a, const Animal& b) {
   constexpr double kNear = 0.05;
   constexpr int kFewest = 3;
   if (a.role != b.role || a.orientation != b.orientation) return false;
+  const std::uint32_t both = a.visible & b.visible;
+  const int common = std::popcount(both);
+  if (common < kFewest) return false;
   const double reach_px = kNear * std::max(a.box.w_px, a.box.h_px);
-  int common = 0;
-  int near = 0;
+  int apart = 0;
   for (std::size_t i = 0; i < a.keypoints.size(); ++i) {
-    const Keypoint& p = a.keypoints[i];
-    const Keypoint& q = b.keypoints[i];
-    if (!(p.weight > 0.0F && q.weight > 0.0F)) continue;
-    ++common;
-    const double dx = p.x_px - q.x_px;
-    const double dy = p.y_px - q.y_px;
+    if ((both >> i & 1U) == 0) continue;
+    const double dx = a.keypoints[i].x_px - b.keypoints[i].x_px;
+    const double dy = a.keypoints[i].y_px - b.keypoints[i].y_px;
     // Most points lie apart, which one coordinate shows.
-    if (std::abs(dx) > reach_px || std::abs(dy) > reach_px) continue;
-    near += std::hypot(dx, dy) <= reach_px ? 1 : 0;
+    const bool is_near =
+        std::abs(dx) <= reach_px && std::abs(dy) <= reach_px && std::hypot(dx, dy) <= reach_px;
+    apart += is_near ? 0 : 1;
+    if (2 * apart >= common) return false;  // most are no longer near
   }
-  return common >= kFewest && 2 * near > common;
+  return true;
 }
 
 // Candidates of one dataset that repeat another.

@@ -52,6 +52,7 @@ std::vector<ShardSample> shard_samples(UnitWork& work) {
   for (const RefinedSample& refined : *work.refined) refined_bodies[refined.sample] = &refined.body;
   const std::vector<EncodedCrop*> crops = crops_by_position(work);
   std::vector<ShardSample> samples;
+  samples.reserve(work.candidates.size());  // a sample is large to move
   for (std::size_t i = 0; i < work.candidates.size(); ++i) {
     const manifests::Judgement& judgement = work.judgements[i];
     if (!is_kept(judgement)) continue;

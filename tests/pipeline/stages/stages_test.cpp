@@ -35,6 +35,13 @@ struct Inputs {
     limits().tau_low = 0.1;
     limits().tau_high = 0.2;
   }
+  // The candidates of all inputs are the same.
+  Inputs(const Inputs& other) : Inputs() {
+    config = other.config;
+    rules = other.rules;
+    assets = other.assets;
+    device = other.device;
+  }
   filters::Thresholds& limits() { return rules.thresholds["a"]; }
   // The guards of the rules are those of the config.
   void guard(const std::function<void(config::GuardConfig&)>& change) {
