@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string_view>
@@ -35,9 +36,10 @@ std::optional<JournalEntry> parse_line(std::string_view line) {
   if (!payload) return std::nullopt;
   try {
     const auto json = parse_json<nlohmann::json>(*payload);
-    JournalEntry entry{whole_number(json.at("unit")),      json.at("input").get<std::string>(),
-                       json.at("file").get<std::string>(), json.at("sha256").get<std::string>(),
-                       whole_number(json.at("bytes")),     whole_number(json.at("rows"))};
+    constexpr std::int64_t kLeast = std::numeric_limits<std::int64_t>::min();
+    JournalEntry entry{whole_number_at(json, "unit", kLeast),  json.at("input").get<std::string>(),
+                       json.at("file").get<std::string>(),     json.at("sha256").get<std::string>(),
+                       whole_number_at(json, "bytes", kLeast), whole_number_at(json, "rows", kLeast)};
     if (!stays_in_folder(entry.file)) return std::nullopt;
     return entry;
   } catch (const nlohmann::json::exception&) {

@@ -26,7 +26,19 @@ std::int64_t whole_number(const Json& value, std::int64_t least = 0,
   }
   throw std::runtime_error(fmt::format(
       "got {}, expected a whole number from {} to {}",
-      is_whole ? value.dump() : std::string("a value of type ") + value.type_name(), least, most));
+      value.is_number() ? value.dump() : std::string("a value of type ") + value.type_name(), least, most));
+}
+
+// The same for a member of an object, which the message names. Throws Json::exception if there is none.
+template <typename Json>
+std::int64_t whole_number_at(const Json& object, const char* key, std::int64_t least = 0,
+                             std::int64_t most = std::numeric_limits<std::int64_t>::max()) {
+  const Json& value = object.at(key);
+  try {
+    return whole_number(value, least, most);
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(fmt::format("{}: {}", key, error.what()));
+  }
 }
 
 }  // namespace q3d::manifests

@@ -16,6 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 using json = nlohmann::ordered_json;
 using manifests::whole_number;
+using manifests::whole_number_at;
 
 std::string text_of(const json& value) {
   return value.is_null() ? std::string() : value.get<std::string>();
@@ -36,9 +37,9 @@ std::string key_of_stage(const json& keys, const char* stage) {
 }
 
 Counts counts_of(const json& counts) {
-  return {whole_number(counts.at("candidates")), whole_number(counts.at("retained")),
-          whole_number(counts.at("refined")), whole_number(counts.at("discarded")),
-          whole_number(counts.at("failed"))};
+  return {whole_number_at(counts, "candidates"), whole_number_at(counts, "retained"),
+          whole_number_at(counts, "refined"), whole_number_at(counts, "discarded"),
+          whole_number_at(counts, "failed")};
 }
 
 // Counts by the names of enumerators.
@@ -107,7 +108,7 @@ void read_config(const json& config, DatasetManifest& manifest) {
     const json& shards = config.at("shards");
     if (shards.contains("unit_size")) {
       constexpr std::int64_t kMost = 1 << 30;
-      manifest.unit_size = static_cast<std::size_t>(whole_number(shards.at("unit_size"), 1, kMost));
+      manifest.unit_size = static_cast<std::size_t>(whole_number_at(shards, "unit_size", 1, kMost));
     }
   }
 }
@@ -157,8 +158,8 @@ DatasetManifest manifest_of(const json& document) {
   read_provenance(document.at("provenance"), manifest);
   for (const json& shard : document.at("shards")) {
     manifest.shards.push_back({manifests::shard_name(shard.at("file")), shard.at("sha256").get<std::string>(),
-                               whole_number(shard.at("bytes")), whole_number(shard.at("rows")),
-                               whole_number(shard.at("unit"))});
+                               whole_number_at(shard, "bytes"), whole_number_at(shard, "rows"),
+                               whole_number_at(shard, "unit")});
   }
   return manifest;
 }

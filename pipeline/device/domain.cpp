@@ -72,7 +72,7 @@ NetworkDomain domain_from_json(const std::string& text) {
     if (!document.contains("held_out")) return domain;
     const json& held_out = document.at("held_out");
     domain.held_out = held_out.at("what").get<std::string>();
-    domain.held_out_pictures = manifests::whole_number(held_out.at("pictures"));
+    domain.held_out_pictures = manifests::whole_number_at(held_out, "pictures");
     domain.quantiles = quantiles_from(held_out.at("l_proj"));
     return domain;
   } catch (const std::exception& error) {

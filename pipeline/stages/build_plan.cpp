@@ -66,7 +66,7 @@ BuildPlan plan_from(const json& document) {
   BuildPlan plan;
   plan.name = name_in(document.at("name"));
   plan.keys.dataset = name_in(document.at("key"));
-  plan.candidates = manifests::whole_number(document.at("candidates"));
+  plan.candidates = manifests::whole_number_at(document, "candidates");
   plan.command = document.at("command").get<std::vector<std::string>>();
   for (const Stage stage : kStages) {
     const std::string name(to_string(stage));

@@ -18,9 +18,9 @@ bool is_at_or_before(const std::string& line, int phase, std::int64_t step) {
   const nlohmann::json document = manifests::parse_json_or_null<nlohmann::json>(line);
   if (!document.is_object()) return false;
   try {
-    const std::int64_t line_phase = manifests::whole_number(document.at("phase"));
+    const std::int64_t line_phase = manifests::whole_number_at(document, "phase");
     return line_phase < phase ||
-           (line_phase == phase && manifests::whole_number(document.at("step")) <= step);
+           (line_phase == phase && manifests::whole_number_at(document, "step") <= step);
   } catch (const nlohmann::json::exception&) {
     return false;
   } catch (const std::runtime_error&) {

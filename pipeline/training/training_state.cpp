@@ -100,10 +100,10 @@ std::optional<StoredState> load_state(const std::filesystem::path& path, const s
   try {
     const nlohmann::json document = manifests::parse_json<nlohmann::json>(entry(state.file, kPosition));
     constexpr int kMost = std::numeric_limits<int>::max();
-    state.position.phase = static_cast<int>(manifests::whole_number(document.at("phase"), 0, kMost));
-    state.position.step = manifests::whole_number(document.at("step"));
+    state.position.phase = static_cast<int>(manifests::whole_number_at(document, "phase", 0, kMost));
+    state.position.step = manifests::whole_number_at(document, "step");
     document.at("watch_mean").get_to(state.position.watch.mean);
-    state.position.watch.seen = manifests::whole_number(document.at("watch_seen"));
+    state.position.watch.seen = manifests::whole_number_at(document, "watch_seen");
   } catch (const std::exception& error) {  // JSON's own, and whole_number's
     throw std::runtime_error(fmt::format("{}: metadata \"{}\": {}", path.string(), kPosition, error.what()));
   }

@@ -2,6 +2,7 @@
 // stage, l the list of exports, e the manifest of an export, w the description of a rendered world.
 #include <nlohmann/json.hpp>
 
+#include "manifests/durability.h"
 #include "manifests/json_parse.h"
 #include "manifests/sealed_json.h"
 #include "pipeline/candidates/ingest.h"
@@ -74,6 +75,7 @@ void read_export(const Scratch& scratch, std::string_view bytes) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  q3d::manifests::set_durability({.syncs = false, .locks = true});  // syncs would take most of the time
   static const Scratch scratch;
   const auto [reader, bytes] = q3d::fuzz::chosen_reader(data, size);
   if (reader == 'p') read_plan(scratch, bytes);

@@ -6,6 +6,7 @@
 #include "manifests/atomic_file.h"
 #include "manifests/checked_line.h"
 #include "manifests/digest.h"
+#include "manifests/durability.h"
 #include "manifests/journal.h"
 #include "manifests/known_files.h"
 #include "manifests/next_field.h"
@@ -62,6 +63,7 @@ void read_digests(const fs::path& file) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  q3d::manifests::set_durability({.syncs = false, .locks = true});  // syncs would take most of the time
   static const q3d::fuzz::Scratch scratch;
   const auto [reader, bytes] = q3d::fuzz::chosen_reader(data, size);
   for (const std::string& text : {std::string(bytes), sealed_lines(bytes)}) {

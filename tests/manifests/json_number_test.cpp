@@ -27,6 +27,12 @@ TEST(JsonNumber, EverythingElseIsRefused) {
         << text;
   }
   EXPECT_THROW(whole_number(json::parse("6"), 0, 5), std::runtime_error);
+  EXPECT_THAT(
+      [] {
+        whole_number_at(json{{"rows", 1e300}}, "rows");
+      },
+      ThrowsMessage<std::runtime_error>(HasSubstr("rows: got 1e+300, expected")));
+  EXPECT_THROW(whole_number_at(json::object(), "rows"), json::exception);
 }
 
 }  // namespace

@@ -49,6 +49,15 @@ TEST(TrainingLog, DropsStepsThatWillBeRepeatedAndTornLines) {
   EXPECT_EQ(got.back().at("step"), 10);
 }
 
+TEST(TrainingLog, DropsLinesWithValuesOfOtherTypes) {
+  const testing::ScratchDir scratch;
+  const auto path = scratch.path() / "log.jsonl";
+  std::ofstream(path)
+      << "{\"phase\": \"a\"}\n{\"phase\": 0, \"step\": []}\n[]\n7\n{}\n{\"phase\": 0, \"step\": 3}\n";
+  const TrainingLog log(path, 0, 5);
+  EXPECT_EQ(lines(path), std::vector<nlohmann::json>{nlohmann::json::parse(R"({"phase": 0, "step": 3})")});
+}
+
 TEST(TrainingLog, ABadPathIsNamed) {
   EXPECT_THROW(TrainingLog("/nonexistent/folder/log.jsonl", 0, 0), std::runtime_error);
 }
