@@ -90,8 +90,18 @@ class CutDisk:
         self._mount(self._inner_image, self._inner, options)
 
     def unmount(self):
-        while self._mounted:
-            _call("umount", self._mounted.pop())
+        """The kernel may hold the inner image for a moment after its file system is gone."""
+        for _ in range(100):
+            try:
+                while self._mounted:
+                    _call("umount", self._mounted[-1])
+                    self._mounted.pop()
+                return
+            except RuntimeError as error:
+                if "busy" not in str(error):
+                    raise
+                time.sleep(0.1)
+        raise RuntimeError(f"{self._mounted[-1]} stays busy")
 
     def __enter__(self):
         try:
