@@ -61,11 +61,12 @@ class _BoundedFile:
         self.seek, self.tell = file.seek, file.tell
 
     def read(self, count: int = -1) -> bytes:
-        if not 0 <= count <= MAX_DIRECTORY_BYTES:
+        if count > MAX_DIRECTORY_BYTES:
             raise TensorFileError(
                 f"{self._path}: a zip directory of {count} bytes, expected at most {MAX_DIRECTORY_BYTES}"
             )
-        return self._file.read(count)
+        # Without a count, zipfile reads the end of the file: 64 KiB at most.
+        return self._file.read(count if count >= 0 else MAX_DIRECTORY_BYTES)
 
 
 class TorchFile:
@@ -131,6 +132,8 @@ class TorchFile:
         try:
             with zipfile.ZipFile(_BoundedFile(file, self.path)) as archive:
                 infos = archive.infolist()
+        except TensorFileError:
+            raise
         except (zipfile.BadZipFile, NotImplementedError, ValueError, struct.error, EOFError) as error:
             reason = _impostor(self._start) or f"not a whole torch file: {error}"
             raise TensorFileError(f"{self.path}: {reason}") from None
