@@ -65,7 +65,9 @@ TEST_F(TrainingRot, EveryDamageIsNamedOrHarmless) {
   for (const auto& [file, count] : counts_) {
     std::printf("%-24s %5d flips, %4d cuts, refused %5d\n", file.c_str(), count.flips, count.cuts,
                 count.refused);
-    if (file.extension() == ".h5") EXPECT_EQ(count.refused, count.flips + count.cuts) << file;
+    if (file.extension() == ".h5") {
+      EXPECT_EQ(count.refused, count.flips + count.cuts) << file;
+    }
   }
 }
 

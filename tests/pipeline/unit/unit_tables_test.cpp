@@ -162,8 +162,9 @@ TEST(UnitTables, CropsSurviveTheDisk) {
 TEST(UnitTables, AColumnOfAnotherShapeIsRefused) {
   const manifests::Table predicted =
       to_table(std::vector<candidates::Candidate>(3), std::vector<PredictedSample>(3));
-  const manifests::Table crops =
-      to_table(std::vector<EncodedCrop>{{.sample = 0}, {.sample = 1}, {.sample = 2}});
+  std::vector<EncodedCrop> encoded(3);
+  for (std::size_t i = 0; i < encoded.size(); ++i) encoded[i].sample = i;
+  const manifests::Table crops = to_table(encoded);
   const auto refused = [](manifests::Table table, const std::string& column, const auto& read) {
     table.numeric.at(column).row_shape = {};
     auto& data = table.numeric.at(column).data;
@@ -186,7 +187,9 @@ TEST(UnitTables, AColumnOfAnotherShapeIsRefused) {
 }
 
 TEST(UnitTables, ACurveOfHalfANumberIsRefused) {
-  manifests::Table table = to_table(std::vector<RefinedSample>{{.sample = 0, .curve = {0.5, 0.25}}});
+  RefinedSample sample;
+  sample.curve = {0.5, 0.25};
+  manifests::Table table = to_table(std::vector<RefinedSample>{sample});
   table.blobs.at("curve").front().resize(15);
   EXPECT_THROW(refined_from_table(table), std::runtime_error);
 }
