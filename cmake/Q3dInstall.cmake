@@ -88,10 +88,11 @@ function(q3d_install_package)
     set(CPACK_RESOURCE_FILE_LICENSE "${PROJECT_SOURCE_DIR}/LICENSE")
     set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
     set(CPACK_DEBIAN_PACKAGE_SECTION science)
-    # dpkg-shlibdeps does not know LibTorch, which is no Debian package.
-    set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS OFF)
-    set(CPACK_DEBIAN_PACKAGE_DEPENDS
-        "libembree3-3, libfmt9, libhdf5-103-1, libicu72, libjpeg62-turbo, libopencv-core406, libopencv-imgcodecs406, libopencv-imgproc406, libssl3, libtbb12, zlib1g")
+    # The packages of the shared libraries; LibTorch, which is no Debian package, is found where it was linked from.
+    set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+    if(LIBTORCH_ROOT)
+      set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS "${LIBTORCH_ROOT}/lib")
+    endif()
     include(CPack)
   endif()
 endfunction()
