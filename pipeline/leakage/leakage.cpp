@@ -63,9 +63,10 @@ Pictures read_test_sets(const config::LeakageConfig& config, manifests::DigestCa
                         LeakageReport& report) {
   Pictures pictures;
   for (const config::DatasetConfig& options : config.test_sets) {
-    const auto [dataset, digest] = candidates::read_dataset(options, digests);
+    const candidates::IngestedDataset ingested = candidates::read_dataset(options, digests);
+    const loaders::formats::Dataset& dataset = ingested.dataset;
     const std::string name = options.name + "/" + options.split;
-    report.summary.test_sets[name] = digest;
+    report.summary.test_sets[name] = ingested.annotations_sha256;
     std::vector<std::string> shas(dataset.records.size());
     tbb::parallel_for(std::size_t{0}, shas.size(), [&](std::size_t i) {
       if (dataset.records[i].image_path.empty() || run::interrupted()) return;
