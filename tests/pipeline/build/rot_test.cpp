@@ -72,8 +72,7 @@ class Rot : public Rebuild {
   static bool may_stay_unseen(const fs::path& file, const testing::Damaged& damaged, bool cuts) {
     if (file.filename() == "digests.txt" || file.extension() == ".stamps") return true;
     const std::size_t last_line = damaged.before.rfind('\n', damaged.before.size() - 2) + 1;
-    const bool is_at_end =
-        damaged.at + 1 >= last_line;  // the line feed before the last line joins two to one
+    const bool is_at_end = damaged.at + 1 >= last_line;  // a damaged line feed joins the last two lines
     return file.filename() == "journal.jsonl" && (cuts || is_at_end);
   }
 
