@@ -18,7 +18,6 @@ namespace q3d::pipeline::leakage {
 namespace {
 
 using manifests::PictureHash;
-using manifests::Reason;
 using manifests::SampleRecord;
 
 // One picture file, whatever the number of animals in it.

@@ -122,6 +122,7 @@ std::vector<PlanFile> read_plan_files(const fs::path& out) {
   }
   std::sort(files.begin(), files.end());
   std::vector<PlanFile> plans;
+  plans.reserve(files.size());
   for (const fs::path& file : files) plans.push_back(read_plan(file));
   return plans;
 }
