@@ -13,7 +13,6 @@ a fault, and must end with the same files and leave no temporary file behind.
 The exit code is 1 if a trial ended otherwise than it should, and its folder then stays for a look.
 """
 
-import argparse
 import errno
 import os
 import pathlib
@@ -21,7 +20,7 @@ import shutil
 import sys
 import tempfile
 
-from jobs import Inputs, add_program_options, check_latest, counted_calls, use_program
+from jobs import Inputs, check_latest, counted_calls, parse, parser_of
 from e2e import Fault, fault_lines, run  # jobs has told Python where it is
 
 # An error that the call may meet: a broken disk, a full one, a quota, a disk without links or locks.
@@ -72,18 +71,14 @@ def strike_all(job, folder, kind, stride):
 
 
 def parsed():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__, JOBS)
     parser.add_argument("stride", type=int, nargs="?", default=1, help="take every STRIDEth call (default: every one)")
-    parser.add_argument("--jobs", default=",".join(JOBS), help="names, separated by commas (default: %(default)s)")
     parser.add_argument("--kinds", default=",".join(ERRORS), help="kinds of calls (default: %(default)s)")
-    add_program_options(parser)
-    return parser.parse_args()
+    return parse(parser)
 
 
 def main():
     arguments = parsed()
-    if not use_program(arguments):
-        return 2
     folder = pathlib.Path(tempfile.mkdtemp(prefix="q3d_faults_")).resolve()
     inputs = Inputs(folder / "shared")
     all_tried = all_failed = 0

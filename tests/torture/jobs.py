@@ -1,5 +1,6 @@
 """The jobs that torture runs, on tiny inputs, and what of their output must be equal."""
 
+import argparse
 import dataclasses
 import functools
 import os
@@ -193,16 +194,21 @@ class Inputs:
         return lambda out: ["sample", "--out", out, "--share", 0.004, "--pixels", 64, "--quiet"]
 
 
-def add_program_options(parser):
+def parser_of(description, jobs=JOBS):
+    """A parser with the options that the scripts on jobs share; `jobs` are the default of --jobs."""
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--jobs", default=",".join(jobs), help="names, separated by commas (default: %(default)s)")
     parser.add_argument("--program", type=pathlib.Path, default=ROOT / "build/release/bin/quadruped3d")
     parser.add_argument("--faults", type=pathlib.Path, default=ROOT / "build/release/tests/faults/libq3d_faults.so")
+    return parser
 
 
-def use_program(arguments):
-    """Tells the tests' own package where the program is. False, after a message, if it is not there."""
+def parse(parser):
+    """The arguments. Tells the tests' own package where the program is, and ends with 2 if it is not there."""
+    arguments = parser.parse_args()
     for variable, path in (("Q3D_PROGRAM", arguments.program), ("Q3D_FAULTS", arguments.faults)):
         if not path.exists():
             print(f"{sys.argv[0]}: {path}: no such file; build it, or say where it is", file=sys.stderr)
-            return False
+            sys.exit(2)
         os.environ[variable] = str(path.resolve())
-    return True
+    return arguments

@@ -10,7 +10,6 @@ files must be those of a run that was never paused. The cases run side by side, 
 The exit code is 1 if a case ended otherwise than it should, and its folder then stays for a look.
 """
 
-import argparse
 import concurrent.futures
 import os
 import pathlib
@@ -23,7 +22,7 @@ import sys
 import tempfile
 import time
 
-from jobs import Inputs, add_program_options, check_no_temporaries, differences, result_of, use_program
+from jobs import Inputs, check_no_temporaries, differences, parse, parser_of, result_of
 from e2e import LIMIT_S, Fault, command, environment, wait_until  # jobs has told Python where it is
 from shared_build import RANKS, Ranks
 
@@ -127,18 +126,14 @@ def cases(names, inputs, folder, seconds, draw):
 
 
 def parsed():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__, JOBS)
     parser.add_argument("seconds", type=float)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--jobs", default=",".join(JOBS), help="names, separated by commas (default: %(default)s)")
-    add_program_options(parser)
-    return parser.parse_args()
+    return parse(parser)
 
 
 def main():
     arguments = parsed()
-    if not use_program(arguments):
-        return 2
     folder = pathlib.Path(tempfile.mkdtemp(prefix="q3d_pause_")).resolve()
     all_cases = list(cases(arguments.jobs.split(","), Inputs(folder / "shared"), folder, arguments.seconds,
                            random.Random(arguments.seed)))

@@ -14,7 +14,6 @@ The last line counts, also after Ctrl-C. The exit code is 1 if a trial ended oth
 mounts no images.
 """
 
-import argparse
 import collections
 import os
 import pathlib
@@ -27,7 +26,7 @@ import tempfile
 import time
 
 from cut_disk import OPTIONS, CutDisk, NoDisks
-from jobs import Inputs, add_program_options, check_latest, differences, use_program
+from jobs import Inputs, check_latest, differences, parse, parser_of
 from e2e import Fault, digests, run, started  # jobs has told Python where it is
 
 JOBS = ("labels", "network", "calibrate", "train", "merge", "export", "sample")
@@ -127,18 +126,14 @@ def take_own_mounts():
 
 
 def parsed():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__, JOBS)
     parser.add_argument("cuts", type=int)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--jobs", default=",".join(JOBS), help="names, separated by commas (default: %(default)s)")
-    add_program_options(parser)
-    return parser.parse_args()
+    return parse(parser)
 
 
 def main():
     arguments = parsed()
-    if not use_program(arguments):
-        return 2
     take_own_mounts()
     folder = pathlib.Path(tempfile.mkdtemp(prefix="q3d_power_cut_")).resolve()
     try:

@@ -11,7 +11,6 @@ on two ranks: one of them is killed, or both. The last line counts kills and tri
 if a trial ended otherwise than it should, and its folder then stays for a look.
 """
 
-import argparse
 import collections
 import pathlib
 import random
@@ -19,7 +18,7 @@ import shutil
 import sys
 import tempfile
 
-from jobs import JOBS, Inputs, add_program_options, check_latest, use_program
+from jobs import Inputs, check_latest, parse, parser_of
 
 
 def trial(job, out, draw, most_kills):
@@ -60,18 +59,14 @@ def torture(jobs, folder, kills, draw):
 
 
 def parsed():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("kills", type=int)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--jobs", default=",".join(JOBS), help="names, separated by commas (default: %(default)s)")
-    add_program_options(parser)
-    return parser.parse_args()
+    return parse(parser)
 
 
 def main():
     arguments = parsed()
-    if not use_program(arguments):
-        return 2
     folder = pathlib.Path(tempfile.mkdtemp(prefix="q3d_torture_")).resolve()
     inputs = Inputs(folder / "shared")
     jobs = [inputs.job(name) for name in arguments.jobs.split(",")]
