@@ -28,7 +28,7 @@ class JsonText {
   explicit JsonText(const std::filesystem::path& file) : file_(file) { fill(); }
 
   std::uint64_t bytes() const { return file_.size(); }
-  // What has been read and masked and not been passed over.
+  // The text that has been read and masked, from the place up to which it was used.
   std::string_view text() const { return std::string_view(text_).substr(at_, masked_ - at_); }
 
   // Whether the first block can be read as it is. It cannot if it is in another encoding or no JSON; whoever
@@ -101,7 +101,7 @@ json parsed(JsonText& text, const std::string& key, const std::function<void(jso
   return builder.document();
 }
 
-// What read_json_file makes of a file that is not read in pieces.
+// Reads the file at once, as read_json_file does, and then gives away the elements.
 json read_whole(const std::filesystem::path& file, const std::string& key,
                 const std::function<void(json&&)>& take) {
   json document = read_json_file(file);

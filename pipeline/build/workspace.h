@@ -45,7 +45,7 @@ class Workspace {
 
   // The next ones may be called after Use::work and Use::join.
   const std::filesystem::path& out() const { return options_.out; }
-  // Where files lie that end with this process.
+  // The folder for files that are needed only until this process ends.
   const std::filesystem::path& scratch() const { return scratch_ ? scratch_->folder() : options_.out; }
   const candidates::Ingest& ingest() const { return ingest_; }
   const stages::AssetDigests& assets() const { return assets_; }

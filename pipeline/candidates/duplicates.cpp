@@ -33,7 +33,7 @@ bool is_same_box(const manifests::Box& a, const manifests::Box& b) {
          std::abs(a.w_px - b.w_px) <= kRoundingPx && std::abs(a.h_px - b.h_px) <= kRoundingPx;
 }
 
-// What decides whether two candidates of one picture are one animal.
+// A candidate, reduced to the values that decide whether two of one picture are one animal.
 struct Animal {
   std::size_t index = 0;  // of the candidate
   config::Role role = config::Role::pseudo;

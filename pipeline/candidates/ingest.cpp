@@ -161,7 +161,7 @@ std::vector<Unit> cut_units(const CandidateList& candidates, const config::Build
   return units;
 }
 
-// What is looked for in all candidates.
+// Searches that go over the candidates of all datasets.
 struct Searches {
   UniqueIds ids;
   Duplicates duplicates;

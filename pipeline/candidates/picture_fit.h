@@ -30,7 +30,7 @@ class PictureFit {
   explicit PictureFit(const config::DatasetConfig& options) : options_(options) {}
 
   void fit(std::vector<manifests::SampleRecord>& records);
-  // Of all records so far.
+  // The notes on all records that were fitted so far.
   std::vector<loaders::formats::Note> notes() const { return notes_.list(); }
 
  private:

@@ -86,10 +86,10 @@ std::map<std::string, manifests::DatasetTerms> terms_of_datasets(const config::B
 // SHA-256 over the shards' digests, one a line, in unit order.
 std::string content_id(const std::vector<ShardEntry>& shards);
 
-// What dataset.json says of the candidates and their verdicts.
+// Counts the candidates and their verdicts for dataset.json.
 class VerdictBooks {
  public:
-  // In the order of the candidates.
+  // Takes the candidates one by one, in their order.
   void add(const candidates::Candidate& candidate, const manifests::Judgement& judgement);
 
   const Counts& counts() const { return counts_; }
@@ -143,9 +143,9 @@ std::string dataset_json(const DatasetInputs& inputs, const VerdictBooks& books,
 // std::runtime_error that names the file, what was found and what was expected, also for a name that is no
 // enumerator's and for a shard that lies elsewhere than in the folder `shards`; and like
 // read_dataset_document.
-DatasetManifest read_dataset_manifest(const std::filesystem::path& folder);
+DatasetManifest read_dataset_manifest(const std::filesystem::path& given);
 // The whole document, without its digest. Throws like manifests::read_dataset_document.
-nlohmann::ordered_json read_dataset_document(const std::filesystem::path& folder);
+nlohmann::ordered_json read_dataset_document(const std::filesystem::path& given);
 // The folder itself, or its `latest`. Throws std::runtime_error when neither holds a dataset.json.
 std::filesystem::path dataset_folder(const std::filesystem::path& given);
 

@@ -1,5 +1,6 @@
-// What the program wrote into an output folder for its later runs: p the plan of a build, m the manifest of a
-// stage, l the list of exports, e the manifest of an export, w the description of a rendered world.
+// The files in which the program notes what lies in an output folder. The first byte of an input says which:
+// p the plan of a build, m the manifest of a stage, l the list of exports, e the manifest of an export, w the
+// description of a rendered world.
 #include <nlohmann/json.hpp>
 
 #include "manifests/durability.h"

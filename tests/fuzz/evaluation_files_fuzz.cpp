@@ -1,5 +1,5 @@
-// What `evaluate` and `evaluate-labels` wrote, and the world's hidden truth: e evaluation.json and
-// samples.csv, l labels.json and labels.csv (parted by 0x1E), t the truth.
+// The files of `evaluate` and `evaluate-labels`, and the world's hidden truth. The first byte of an input
+// says which: e evaluation.json and samples.csv, l labels.json and labels.csv (parted by 0x1E), t the truth.
 #include <cmath>
 
 #include "pipeline/evaluation/evaluation_files.h"

@@ -1,5 +1,5 @@
-// What a training leaves and a checkpoint says of itself: s a state's position, l the log, c the sizes of a
-// network, d the pictures that it knows.
+// The files of a training and the metadata of a checkpoint. The first byte of an input says which: s a
+// state's position, l the log, c the sizes of a network, d the pictures that it knows.
 #include <nlohmann/json.hpp>
 
 #include "manifests/atomic_file.h"

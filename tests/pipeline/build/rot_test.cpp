@@ -19,7 +19,7 @@ constexpr int kCutsOneIn = 11;  // the others are flipped bits
 constexpr int kOtherQuality = 80;
 constexpr int kMostFailures = 10;  // more of them say nothing new
 
-// What a file is, for the count: a stage's tables are one kind.
+// The kind under which a file is counted. The tables of a stage are one kind.
 std::string kind_of(const fs::path& file) {
   const std::string first = *file.begin();
   const std::string name = file.filename();
@@ -84,7 +84,7 @@ class Rot : public Rebuild {
     }
   }
 
-  // What comes after the damage: the same build, another one, which reads the stages' tables, or a repair.
+  // After the damage comes the same build, another one, which reads the stages' tables, or a repair.
   void expect_mended(int way, const std::string& what) {
     if (way == 2) {
       run::RunOptions options;
