@@ -105,13 +105,18 @@ class SharedBuild(SceneCase):
         self.wait_all(self.start_all(["build", "--config", config, "--out", self.folder / "shared"], 3))
         self.assertEqual(self.files(self.folder / "shared"), self.files(self.folder / "alone"))
 
-    def test_a_killed_rank_loses_its_open_units_and_the_others_finish(self):
+    def start_stopped(self, fault):
+        """Two ranks that have stopped themselves: the first before its first shard, the second at the fault."""
         store = self.launcher_store()
         first = self.start(self.words("out"), 0, 2, store,
                            Fault("shards-", "sync", "stop", skip=FIRST_SHARD_OF_RANK_0))
         first.wait_for_fault()
-        second = self.start(self.words("out"), 1, 2, store, Fault("shards-", "sync", "stop", skip=3))
+        second = self.start(self.words("out"), 1, 2, store, fault)
         second.wait_for_fault()
+        return first, second
+
+    def test_a_killed_rank_loses_its_open_units_and_the_others_finish(self):
+        first, second = self.start_stopped(Fault("shards-", "sync", "stop", skip=3))
         made = self.shards_of_others("out")
         self.assertGreater(made, 0)
         second.send(signal.SIGKILL)
@@ -121,12 +126,7 @@ class SharedBuild(SceneCase):
 
     def start_and_stop_second(self):
         """Two ranks. The second has made a unit and stopped itself when a file of the next had its temporary name."""
-        store = self.launcher_store()
-        first = self.start(self.words("out"), 0, 2, store,
-                           Fault("shards-", "sync", "stop", skip=FIRST_SHARD_OF_RANK_0))
-        first.wait_for_fault()
-        second = self.start(self.words("out"), 1, 2, store, Fault(".h5", "rename", "stop", skip=6))
-        second.wait_for_fault()
+        first, second = self.start_stopped(Fault(".h5", "rename", "stop", skip=6))
         self.assertEqual(len(list((self.folder / "out").rglob("*.tmp"))), 2)  # one of each rank
         first.send(signal.SIGCONT)
         return first, second
