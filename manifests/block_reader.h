@@ -10,7 +10,6 @@
 #include <string_view>
 
 #include "manifests/file_descriptor.h"
-#include "manifests/file_stamp.h"
 
 namespace q3d::manifests {
 

@@ -68,7 +68,7 @@ DeviceChoice cuda_choice(int index) {
 }
 
 int gpu_of(int local_rank) {
-  const int found = static_cast<int>(torch::cuda::device_count());
+  const torch::DeviceIndex found = torch::cuda::device_count();
   return found > 0 ? local_rank % found : 0;
 }
 

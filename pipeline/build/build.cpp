@@ -35,6 +35,7 @@ std::vector<PoolErrors> pools_of(const config::JudgingRules& rules, const candid
   };
   dataset::for_each_verdict(ingest, judgements, add);
   std::vector<PoolErrors> list;
+  list.reserve(pools.size());
   for (auto& [name, pool] : pools) list.push_back(std::move(pool));
   return list;
 }

@@ -122,7 +122,7 @@ void RankShare::hear_leader() {
   }
 }
 
-void RankShare::pause() {
+void RankShare::pause() const {
   run::throw_if_interrupted();
   std::this_thread::sleep_for(std::max(kPause, std::chrono::milliseconds(2 * place_.size)));
 }

@@ -78,7 +78,7 @@ class RankShare {
   std::optional<std::string> await_word(const std::string& key);
   std::optional<std::int64_t> claim(std::int64_t units);
   void hear_leader();
-  void pause();
+  void pause() const;
   void say_farewell();
 
   model::ranks::RankPlace place_;

@@ -47,9 +47,9 @@ struct Setting {
       std::variant<bool Struct::*, int Struct::*, std::uint64_t Struct::*, double Struct::*,
                    std::optional<double> Struct::*, std::optional<int> Struct::*, std::string Struct::*,
                    std::filesystem::path Struct::*, std::vector<std::string> Struct::*, Word<Struct>>;
-  const char* key;
+  const char* key = nullptr;
   Member member;
-  const char* description;  // Markdown; a sentence or more, without the range and the default
+  const char* description = nullptr;  // Markdown; a sentence or more, without the range and the default
   Range range{};
   std::vector<std::string> words{};  // allowed texts, of a list too; empty allows any
   bool is_required = false;

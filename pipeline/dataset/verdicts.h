@@ -38,6 +38,7 @@ class VerdictReader {
  public:
   // Reads the file. Throws std::runtime_error that names it if it cannot be read or lacks a column.
   explicit VerdictReader(const std::filesystem::path& file);
+  ~VerdictReader() = default;
   VerdictReader(const VerdictReader&) = delete;
   VerdictReader& operator=(const VerdictReader&) = delete;
 
@@ -48,8 +49,9 @@ class VerdictReader {
 
  private:
   struct Columns {
-    std::size_t id, verdict, reason, initial_error, final_error, gain, iterations, best_iteration, dataset,
-        split, source, species, family, shard, row, image_sha256, detail;
+    std::size_t id = 0, verdict = 0, reason = 0, initial_error = 0, final_error = 0, gain = 0;
+    std::size_t iterations = 0, best_iteration = 0, dataset = 0, split = 0, source = 0, species = 0;
+    std::size_t family = 0, shard = 0, row = 0, image_sha256 = 0, detail = 0;
     std::array<std::optional<std::size_t>, manifests::kTrustColumns.size()>
         trust{};  // absent before schema 2
   };

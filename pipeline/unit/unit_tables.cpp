@@ -218,6 +218,7 @@ Table to_table(const std::vector<RefinedSample>& samples) {
   Table table;
   table.rows = static_cast<std::int64_t>(samples.size());
   std::vector<std::int64_t> positions;
+  positions.reserve(samples.size());
   for (const RefinedSample& sample : samples) positions.push_back(static_cast<std::int64_t>(sample.sample));
   add_curves(table, "curve", samples, &RefinedSample::curve);
   // The column is absent where nothing was held out.
@@ -248,10 +249,12 @@ Table to_table(const std::vector<MeasuredLabel>& labels) {
   Table table;
   table.rows = static_cast<std::int64_t>(labels.size());
   std::vector<std::int64_t> positions;
+  positions.reserve(labels.size());
   for (const MeasuredLabel& label : labels) positions.push_back(static_cast<std::int64_t>(label.sample));
   table.add<std::int64_t>("sample", {}, positions);
   for (const manifests::TrustColumn& column : measured_columns()) {
     std::vector<double> values;
+    values.reserve(labels.size());
     for (const MeasuredLabel& label : labels) values.push_back(label.scores.*column.score);
     table.add<double>(column.name, {}, values);
   }
