@@ -17,15 +17,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The temporary file lies in the target's folder, because rename works only within a file system. Process id
-// and counter keep two writers of one path apart, and a random number those on two machines.
-fs::path temporary_name(const fs::path& path) {
-  static std::atomic<unsigned> counter{0};
-  static const unsigned machine = std::random_device{}();
-  return path.parent_path() /
-         fmt::format("{}.{}.{:08x}.{}.tmp", path.filename().string(), ::getpid(), machine, counter++);
-}
-
 class RemoveOnFailure {
  public:
   explicit RemoveOnFailure(const fs::path& path) : path_(path) {}
@@ -51,6 +42,13 @@ void finish(FileDescriptor& file, const fs::path& temporary, const fs::path& pat
 }
 
 }  // namespace
+
+fs::path temporary_name(const fs::path& path) {
+  static std::atomic<unsigned> counter{0};
+  static const unsigned machine = std::random_device{}();
+  return path.parent_path() /
+         fmt::format("{}.{}.{:08x}.{}.tmp", path.filename().string(), ::getpid(), machine, counter++);
+}
 
 void write_file_atomically(const fs::path& path, std::span<const std::byte> content) {
   const fs::path temporary = temporary_name(path);

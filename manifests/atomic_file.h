@@ -12,6 +12,11 @@
 
 namespace q3d::manifests {
 
+// Returns a name for a file that is to be called `path` once it is whole. It lies in the same folder, because
+// rename works only within a file system. Process id and a counter keep two writers of one path apart, and a
+// random number those on two machines. remove_temporaries() knows such names.
+std::filesystem::path temporary_name(const std::filesystem::path& path);
+
 // Writes `content` to `path`. If this fails, the temporary file is removed, an older file at `path` stays as
 // it was, and IoError (manifests/file_descriptor.h) names the path and the reason (disk full, ...).
 void write_file_atomically(const std::filesystem::path& path, std::span<const std::byte> content);

@@ -1,11 +1,9 @@
 #include "manifests/spill_file.h"
 
 #include <fcntl.h>
-#include <fmt/format.h>
 #include <unistd.h>
 
-#include <atomic>
-#include <random>
+#include "manifests/atomic_file.h"
 
 namespace q3d::manifests {
 namespace {
@@ -20,9 +18,7 @@ FileDescriptor nameless(const fs::path& folder) {
   } catch (const IoError& error) {
     if (error.code() != EOPNOTSUPP && error.code() != EISDIR && error.code() != EINVAL) throw;
   }
-  static std::atomic<unsigned> counter{0};
-  static const unsigned machine = std::random_device{}();
-  const fs::path name = folder / fmt::format("spill.{}.{:08x}.{}.tmp", ::getpid(), machine, counter++);
+  const fs::path name = temporary_name(folder / "spill");
   FileDescriptor file(name, O_RDWR | O_CREAT | O_EXCL);
   if (::unlink(name.c_str()) != 0) throw_errno("remove", name);
   return file;
