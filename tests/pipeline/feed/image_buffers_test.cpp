@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <memory>
 #include <optional>
 #include <set>
 #include <thread>
@@ -17,6 +18,9 @@ TEST(ImageBuffers, GivesABufferAgainOnceItIsReturned) {
   EXPECT_NE(first.get(), second.get());
   const float* returned = first.get();
   first.reset();
+  // Had the memory been freed, this would take it.
+  const auto other = std::make_unique_for_overwrite<float[]>(8);
+  EXPECT_NE(other.get(), returned);
   EXPECT_EQ(buffers.take().get(), returned);
 }
 
