@@ -35,6 +35,7 @@ TEST(ImageBuffers, ABufferOutlivesThePool) {
 TEST(ImageBuffers, ThreadsNeverShareABuffer) {
   const ImageBuffers buffers(1);
   std::vector<std::jthread> threads;
+  threads.reserve(4);
   for (int thread = 0; thread < 4; ++thread) {
     threads.emplace_back([&buffers, thread] {
       for (int round = 0; round < 2000; ++round) {
