@@ -1,10 +1,8 @@
 #include "model/depthwise.h"
 
 #include <ATen/Parallel.h>
-#include <torch/csrc/autograd/custom_function.h>
 
 #include <algorithm>
-#include <array>
 #include <vector>
 
 #include "model/vectorised.h"
@@ -97,7 +95,7 @@ struct Columns {
   std::int64_t first_out, first_in, count;
 };
 
-Columns columns_of(std::int64_t tap, const DepthwiseShape& shape, std::int64_t in, std::int64_t out) {
+Columns columns_of(std::int64_t tap, const ConvolutionShape& shape, std::int64_t in, std::int64_t out) {
   const std::int64_t offset = tap - shape.before;  // in = out * stride + offset
   const std::int64_t first = offset >= 0 ? 0 : (-offset + shape.stride - 1) / shape.stride;
   const std::int64_t end = std::min(out, offset >= in ? 0 : (in - 1 - offset) / shape.stride + 1);
@@ -105,7 +103,7 @@ Columns columns_of(std::int64_t tap, const DepthwiseShape& shape, std::int64_t i
 }
 
 // The kernel's numbers of a block of channels: (side * side, kLanes).
-std::vector<float> kernel_block(const float* weight, const DepthwiseShape& shape, std::int64_t channel,
+std::vector<float> kernel_block(const float* weight, const ConvolutionShape& shape, std::int64_t channel,
                                 std::int64_t channels) {
   const std::int64_t taps = shape.side * shape.side;
   std::vector<float> block(static_cast<std::size_t>(taps * kLanes));
@@ -120,7 +118,7 @@ std::vector<float> kernel_block(const float* weight, const DepthwiseShape& shape
 // Adds one row of the output's gradient to the sums of the kernel, (side * side, kLanes).
 template <typename T>
 void add_row_to_kernel(std::vector<float>& sums, Row& gradient, Row& input, const Maps<const T>& maps,
-                       const DepthwiseShape& shape, std::int64_t sample, std::int64_t row,
+                       const ConvolutionShape& shape, std::int64_t sample, std::int64_t row,
                        std::int64_t channel, std::int64_t out_width) {
   for (std::int64_t i = 0; i < shape.side; ++i) {
     const std::int64_t in_row = row * shape.stride + i - shape.before;
@@ -138,7 +136,7 @@ void add_row_to_kernel(std::vector<float>& sums, Row& gradient, Row& input, cons
 template <typename T>
 std::pair<torch::Tensor, torch::Tensor> parameter_gradients(const torch::Tensor& gradient,
                                                             const torch::Tensor& input,
-                                                            const DepthwiseShape& shape) {
+                                                            const ConvolutionShape& shape) {
   const auto g = maps_of<T>(gradient);
   const auto x = maps_of<T>(input);
   const std::int64_t taps = shape.side * shape.side;
@@ -172,7 +170,7 @@ std::pair<torch::Tensor, torch::Tensor> parameter_gradients(const torch::Tensor&
 // Gradient of the maps, of their dtype.
 template <typename T>
 torch::Tensor map_gradient(const torch::Tensor& gradient, const torch::Tensor& input,
-                           const torch::Tensor& weight, const DepthwiseShape& shape) {
+                           const torch::Tensor& weight, const ConvolutionShape& shape) {
   const torch::Tensor result = torch::empty_like(input, torch::MemoryFormat::ChannelsLast);
   const auto g = maps_of<T>(gradient);
   const Maps<T> out{result.data_ptr<T>(), result.size(2), result.size(3), result.size(1)};
@@ -203,66 +201,30 @@ torch::Tensor map_gradient(const torch::Tensor& gradient, const torch::Tensor& i
   return result;
 }
 
-torch::Tensor convolve(const torch::Tensor& maps, const torch::Tensor& weight, const torch::Tensor& bias,
-                       const DepthwiseShape& shape) {
-  const bool even = shape.before == shape.after;
-  const torch::Tensor input =
-      even ? maps : torch::constant_pad_nd(maps, {shape.before, shape.after, shape.before, shape.after});
-  return torch::conv2d(input, weight, bias, shape.stride, even ? shape.before : 0, /*dilation=*/1,
-                       maps.size(1));
+template <typename T>
+ConvolutionGradients gradients_as(const torch::Tensor& gradient, const torch::Tensor& maps,
+                                  const torch::Tensor& weight, const ConvolutionShape& shape,
+                                  const std::array<bool, 3>& needed) {
+  ConvolutionGradients result;
+  if (needed[0]) result.maps = map_gradient<T>(gradient, maps, weight, shape);
+  if (needed[1] || needed[2]) {
+    const auto [of_weight, of_bias] = parameter_gradients<T>(gradient, maps, shape);
+    if (needed[1]) result.weight = of_weight.to(weight.scalar_type());
+    if (needed[2]) result.bias = of_bias.to(weight.scalar_type());
+  }
+  return result;
 }
-
-class OwnGradients : public torch::autograd::Function<OwnGradients> {
- public:
-  static torch::Tensor forward(torch::autograd::AutogradContext* context, const torch::Tensor& maps,
-                               const torch::Tensor& weight, const torch::Tensor& bias,
-                               const std::vector<std::int64_t>& shape) {
-    context->save_for_backward({maps, weight});
-    context->saved_data["shape"] = shape;
-    return convolve(maps, weight, bias, {shape[0], shape[1], shape[2], shape[3]});
-  }
-
-  static torch::autograd::variable_list backward(torch::autograd::AutogradContext* context,
-                                                 const torch::autograd::variable_list& gradients) {
-    const auto saved = context->get_saved_variables();
-    const auto numbers = context->saved_data["shape"].toIntVector();
-    const DepthwiseShape shape{numbers[0], numbers[1], numbers[2], numbers[3]};
-    const torch::Tensor maps = saved[0].contiguous(at::MemoryFormat::ChannelsLast);
-    const torch::Tensor gradient =
-        gradients[0].to(maps.scalar_type()).contiguous(at::MemoryFormat::ChannelsLast);
-    return maps.scalar_type() == torch::kFloat32
-               ? backward_as<float>(context, gradient, maps, saved[1], shape)
-               : backward_as<c10::BFloat16>(context, gradient, maps, saved[1], shape);
-  }
-
- private:
-  template <typename T>
-  static torch::autograd::variable_list backward_as(const torch::autograd::AutogradContext* context,
-                                                    const torch::Tensor& gradient, const torch::Tensor& maps,
-                                                    const torch::Tensor& weight,
-                                                    const DepthwiseShape& shape) {
-    torch::Tensor of_maps, of_weight, of_bias;
-    if (context->needs_input_grad(0)) of_maps = map_gradient<T>(gradient, maps, weight, shape);
-    if (context->needs_input_grad(1) || context->needs_input_grad(2)) {
-      std::tie(of_weight, of_bias) = parameter_gradients<T>(gradient, maps, shape);
-      of_weight = of_weight.to(weight.scalar_type());
-      of_bias = of_bias.to(weight.scalar_type());
-    }
-    return {of_maps, of_weight, of_bias, torch::Tensor()};
-  }
-};
 
 }  // namespace
 
-torch::Tensor depthwise_convolution(const torch::Tensor& maps, const torch::Tensor& weight,
-                                    const torch::Tensor& bias, const DepthwiseShape& shape) {
-  const torch::ScalarType dtype = maps.scalar_type();
-  const torch::Tensor own_weight = weight.to(dtype);
-  const torch::Tensor own_bias = bias.to(dtype);
-  const bool own = maps.is_cpu() && (dtype == torch::kFloat32 || dtype == torch::kBFloat16);
-  if (!own || !at::GradMode::is_enabled()) return convolve(maps, own_weight, own_bias, shape);
-  return OwnGradients::apply(maps, own_weight, own_bias,
-                             std::vector<std::int64_t>{shape.side, shape.stride, shape.before, shape.after});
+ConvolutionGradients depthwise_gradients(const torch::Tensor& gradient, const torch::Tensor& maps,
+                                         const torch::Tensor& weight, const ConvolutionShape& shape,
+                                         const std::array<bool, 3>& needed) {
+  const torch::Tensor own_maps = maps.contiguous(at::MemoryFormat::ChannelsLast);
+  const torch::Tensor own_gradient = gradient.contiguous(at::MemoryFormat::ChannelsLast);
+  return maps.scalar_type() == torch::kFloat32
+             ? gradients_as<float>(own_gradient, own_maps, weight, shape, needed)
+             : gradients_as<c10::BFloat16>(own_gradient, own_maps, weight, shape, needed);
 }
 
 }  // namespace q3d::model

@@ -5,7 +5,7 @@
 #include <string>
 #include <utility>
 
-#include "model/depthwise.h"
+#include "model/relu6_convolution.h"
 
 namespace q3d::model {
 namespace {
@@ -39,7 +39,7 @@ constexpr double kLiteMean = 127.0;
 constexpr double kLiteDeviation = 128.0;
 
 // TensorFlow's SAME padding of maps with an even side: at stride 2, the odd pixel comes after the last one.
-DepthwiseShape same_padding(std::int64_t side, std::int64_t stride) {
+ConvolutionShape same_padding(std::int64_t side, std::int64_t stride) {
   const std::int64_t padding = side - stride;
   return {side, stride, padding / 2, padding - padding / 2};
 }
@@ -61,7 +61,7 @@ class NormedConvolution {
 
   NormedConvolution(torch::nn::Module& owner, const Names& names, const Sizes& sizes,
                     const Placement& placement)
-      : sizes_(sizes) {
+      : shape_(same_padding(sizes.side, sizes.stride)) {
     const auto convolution = owner.register_module(names.convolution, std::make_shared<torch::nn::Module>());
     const auto norm = owner.register_module(names.norm, std::make_shared<torch::nn::Module>());
     weight_ = convolution->register_parameter(
@@ -71,28 +71,30 @@ class NormedConvolution {
     shift_ = norm->register_parameter("bias", torch::empty({sizes.out}, placement.vector()));
   }
 
-  torch::Tensor forward(const torch::Tensor& x) const {
-    const torch::Tensor scaled = (weight_ * scale_.view({-1, 1, 1, 1})).to(dtype());
-    const DepthwiseShape shape = same_padding(sizes_.side, sizes_.stride);
-    if (sizes_.groups > 1) return depthwise_convolution(x, scaled, shift_, shape);
-    const torch::Tensor padded =
-        shape.after > 0 ? torch::constant_pad_nd(x, {shape.before, shape.after, shape.before, shape.after})
-                        : x;
-    return torch::conv2d(padded, scaled, shift_.to(dtype()), shape.stride);
+  // Without ReLU6: for convolutions of 1 x 1 pixels, which need no padding.
+  torch::Tensor forward(const torch::Tensor& x) const { return torch::conv2d(x, weight(), bias()); }
+
+  // The result gets `frame` round it.
+  torch::Tensor forward_relu6(const torch::Tensor& x, const Frame& frame = {}) const {
+    return relu6_convolution(x, weight(), bias(), shape_, frame);
   }
 
-  torch::Tensor forward_relu6(const torch::Tensor& x) const {
-    torch::Tensor maps = forward(x);
-    return torch::hardtanh_(maps, 0.0, 6.0);
+  // `x` has the zeros round it that this convolution needs.
+  torch::Tensor forward_relu6_of_framed(const torch::Tensor& x) const {
+    return relu6_convolution(x, weight(), bias(), {shape_.side, shape_.stride, 0, 0});
   }
 
+  const ConvolutionShape& shape() const { return shape_; }
   torch::ScalarType dtype() const { return weight_.scalar_type(); }
 
  private:
+  torch::Tensor weight() const { return (weight_ * scale_.view({-1, 1, 1, 1})).to(dtype()); }
+  torch::Tensor bias() const { return shift_.to(dtype()); }
+
   torch::Tensor weight_;
   torch::Tensor scale_;
   torch::Tensor shift_;
-  Sizes sizes_;
+  ConvolutionShape shape_;
 };
 
 // A wide depthwise convolution between two 1 x 1 convolutions, and a shortcut where the sizes allow it
@@ -111,12 +113,19 @@ class InvertedResidual : public torch::nn::Module {
   }
 
   torch::Tensor forward(const torch::Tensor& x) const {
-    const torch::Tensor wide = expand_ ? expand_->forward_relu6(x) : x;
-    const torch::Tensor narrow = project_->forward(depthwise_->forward_relu6(wide));
+    const torch::Tensor narrow = project_->forward(widen_and_convolve(x));
     return has_shortcut_ ? narrow + x : narrow;
   }
 
  private:
+  torch::Tensor widen_and_convolve(const torch::Tensor& x) const {
+    if (!expand_) return depthwise_->forward_relu6(x);
+    const ConvolutionShape& shape = depthwise_->shape();
+    if (shape.before == shape.after) return depthwise_->forward_relu6(expand_->forward_relu6(x));
+    // A convolution cannot add unequal numbers of zeros by itself.
+    return depthwise_->forward_relu6_of_framed(expand_->forward_relu6(x, {shape.before, shape.after}));
+  }
+
   std::unique_ptr<NormedConvolution> expand_;  // null where the block does not widen
   std::unique_ptr<NormedConvolution> depthwise_;
   std::unique_ptr<NormedConvolution> project_;

@@ -1,11 +1,12 @@
 #include "model/packed_matrix.h"
 
-#include <ATen/core/dispatch/Dispatcher.h>
 #include <torch/csrc/autograd/custom_function.h>
 
 #include <optional>
 #include <stdexcept>
 #include <string_view>
+
+#include "model/compiler_operators.h"
 
 namespace q3d::model {
 namespace {
@@ -17,13 +18,6 @@ bool has_avx512() {
 #else
   return false;
 #endif
-}
-
-// LibTorch has no C++ function for these operators of its own compiler, but keeps them in its table of
-// operators.
-template <typename Signature>
-c10::TypedOperatorHandle<Signature> find_operator(const char* name) {
-  return c10::Dispatcher::singleton().findSchemaOrThrow(name, "").typed<Signature>();
 }
 
 torch::Tensor pack(const torch::Tensor& weight) {
