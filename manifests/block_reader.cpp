@@ -12,10 +12,10 @@ constexpr std::size_t kBlock = std::size_t{1} << 18U;
 }  // namespace
 
 BlockReader::BlockReader(std::filesystem::path path)
-    : path_(std::move(path)), file_(open_input(path_)), size_(file_.size()) {}
+    : path_(std::move(path)), file_(open_input(path_)), stamp_(stamp_of(file_)) {}
 
 std::size_t BlockReader::read(std::span<char> bytes) {
-  const auto count = static_cast<std::size_t>(std::min<std::uint64_t>(bytes.size(), size_ - at_));
+  const auto count = static_cast<std::size_t>(std::min<std::uint64_t>(bytes.size(), size() - at_));
   for (int attempt = 0;; ++attempt) {
     try {
       file_.read_at(at_, std::as_writable_bytes(bytes.first(count)));
@@ -25,7 +25,7 @@ std::size_t BlockReader::read(std::span<char> bytes) {
       if (error.code() != ESTALE || !pause_before_retry(ESTALE, attempt)) throw;
     }
     FileDescriptor again = open_input(path_);
-    if (again.size() != size_) {
+    if (stamp_of(again) != stamp_) {
       throw IoError("read", path_, "it has changed while it was read: run again", ESTALE);
     }
     file_ = std::move(again);

@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "manifests/file_descriptor.h"
+#include "manifests/file_stamp.h"
 
 namespace q3d::manifests {
 
@@ -18,16 +19,16 @@ class BlockReader {
   // Opens a regular file. Throws IoError.
   explicit BlockReader(std::filesystem::path path);
 
-  std::uint64_t size() const { return size_; }  // of the whole file
+  std::uint64_t size() const { return stamp_.size; }  // of the whole file
   // Fills `bytes` with what follows, and returns how many there were: fewer only at the end. If the server of
   // a network disk has forgotten the open file (ESTALE), the file is opened again. Throws IoError, also if
-  // the file has changed by then.
+  // the file was written or replaced by then.
   std::size_t read(std::span<char> bytes);
 
  private:
   std::filesystem::path path_;
   FileDescriptor file_;
-  std::uint64_t size_ = 0;
+  FileStamp stamp_;
   std::uint64_t at_ = 0;
 };
 

@@ -8,6 +8,8 @@
 #include <filesystem>
 #include <optional>
 
+#include "manifests/file_descriptor.h"
+
 namespace q3d::manifests {
 
 inline constexpr std::int64_t kNsPerSecond = 1'000'000'000;
@@ -24,5 +26,7 @@ struct FileStamp {
 // The stamp of the file or folder, or of what a symbolic link leads to; nothing, and errno, if the kernel
 // gives none.
 std::optional<FileStamp> stamp_of(const std::filesystem::path& path);
+// The stamp of an open file. Throws IoError.
+FileStamp stamp_of(const FileDescriptor& file);
 
 }  // namespace q3d::manifests

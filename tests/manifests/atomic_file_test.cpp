@@ -4,6 +4,7 @@
 
 #include <fstream>
 
+#include "manifests/digest.h"
 #include "tests/manifests/full_disk.h"
 #include "tests/support/paths.h"
 
@@ -63,6 +64,50 @@ TEST(AtomicFile, CommitGivesTheNameOrRemovesTheTemporary) {
   fs::create_directories(scratch.path() / "folder" / "not_empty");
   EXPECT_THROW(commit_file(temporary, scratch.path() / "folder"), std::runtime_error);
   EXPECT_FALSE(fs::exists(temporary));
+}
+
+TEST(AtomicWriter, GivesTheNameToTheWholeTextAlone) {
+  const testing::ScratchDir scratch;
+  const fs::path path = scratch.path() / "a.csv";
+  write_file_atomically(path, "old");
+  std::string text;
+  AtomicWriter writer(path);
+  for (int i = 0; i < 100'000; ++i) {  // more than one block
+    const std::string line = std::to_string(i) + "\n";
+    writer.write(line);
+    text += line;
+  }
+  EXPECT_EQ(read_file(path), "old");
+  EXPECT_EQ(writer.commit(), sha256(text));
+  EXPECT_EQ(read_file(path), text);
+  EXPECT_EQ(count_files(scratch.path()), 1U);
+}
+
+TEST(AtomicWriter, LeavesNothingBehindIfItIsNotCommitted) {
+  const testing::ScratchDir scratch;
+  const fs::path path = scratch.path() / "a.csv";
+  write_file_atomically(path, "old");
+  {
+    AtomicWriter writer(path);
+    writer.write("new");
+    EXPECT_EQ(count_files(scratch.path()), 2U);
+  }
+  EXPECT_EQ(read_file(path), "old");
+  EXPECT_EQ(count_files(scratch.path()), 1U);
+}
+
+TEST(AtomicWriter, FullDiskKeepsTheOldFileAndLeavesNoTemporary) {
+  const testing::ScratchDir scratch;
+  const fs::path path = scratch.path() / "a.csv";
+  write_file_atomically(path, "old");
+  {
+    AtomicWriter writer(path);
+    writer.write(std::string(10'000, 'x'));
+    const testing::FullDisk full(4096);
+    EXPECT_THROW(writer.commit(), IoError);
+  }
+  EXPECT_EQ(read_file(path), "old");
+  EXPECT_EQ(count_files(scratch.path()), 1U);
 }
 
 TEST(AtomicFile, RemovesOnlyTemporaries) {

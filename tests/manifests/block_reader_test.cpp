@@ -2,10 +2,16 @@
 
 #include <gtest/gtest.h>
 
+#include <cerrno>
+#include <chrono>
+#include <fstream>
+#include <functional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "manifests/atomic_file.h"
+#include "tests/support/failing_io.h"
 #include "tests/support/paths.h"
 
 namespace q3d::manifests {
@@ -46,6 +52,48 @@ TEST_F(LineReaderTest, ReadsAcrossBlocks) {
     EXPECT_EQ(lines(text), expected);
     EXPECT_TRUE(was_whole_);
   }
+}
+
+// A network disk's server has forgotten the open file, and its content may be another one by now.
+class StaleFile : public ::testing::Test {
+ protected:
+  StaleFile() { std::ofstream(path_) << "0123456789"; }
+
+  // What follows the first four bytes if the server forgets the file after them, and `meanwhile` happens.
+  std::string rest(const std::function<void()>& meanwhile) const {
+    BlockReader reader(path_);
+    std::string text(4, ' ');
+    reader.read(text);
+    meanwhile();
+    const testing::FailingIo io(testing::Call::read, "/file", ESTALE, 2);
+    text.resize(100);
+    text.resize(reader.read(text));
+    return text;
+  }
+  void write_again() const {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));  // a tick of the file system's clock
+    std::ofstream(path_) << "9876543210";
+  }
+
+  testing::ScratchDir scratch_;
+  std::filesystem::path path_ = scratch_.path() / "file";
+};
+
+TEST_F(StaleFile, IsReadOnIfItIsTheSame) {
+  EXPECT_EQ(rest([] {}), "456789");
+}
+
+TEST_F(StaleFile, IsRefusedIfItWasWritten) {
+  EXPECT_THROW(rest([this] { write_again(); }), IoError);
+}
+
+TEST_F(StaleFile, IsRefusedIfItWasReplacedByAFileOfTheSameTime) {
+  const auto time = std::filesystem::last_write_time(path_);
+  EXPECT_THROW(rest([&] {
+                 write_file_atomically(path_, "9876543210");
+                 std::filesystem::last_write_time(path_, time);
+               }),
+               IoError);
 }
 
 TEST_F(LineReaderTest, RefusesWhatIsNoFile) {
