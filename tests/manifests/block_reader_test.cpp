@@ -60,12 +60,13 @@ class StaleFile : public ::testing::Test {
   StaleFile() { std::ofstream(path_) << "0123456789"; }
 
   // What follows the first four bytes if the server forgets the file after them, and `meanwhile` happens.
-  std::string rest(const std::function<void()>& meanwhile) const {
+  // `name` is the kernel's of the open file by then.
+  std::string rest(const std::function<void()>& meanwhile, const char* name = "/file") const {
     BlockReader reader(path_);
     std::string text(4, ' ');
     reader.read(text);
     meanwhile();
-    const testing::FailingIo io(testing::Call::read, "/file", ESTALE, 2);
+    const testing::FailingIo io(testing::Call::read, name, ESTALE, 2);
     text.resize(100);
     text.resize(reader.read(text));
     return text;
@@ -89,11 +90,11 @@ TEST_F(StaleFile, IsRefusedIfItWasWritten) {
 
 TEST_F(StaleFile, IsRefusedIfItWasReplacedByAFileOfTheSameTime) {
   const auto time = std::filesystem::last_write_time(path_);
-  EXPECT_THROW(rest([&] {
-                 write_file_atomically(path_, "9876543210");
-                 std::filesystem::last_write_time(path_, time);
-               }),
-               IoError);
+  const auto replace = [&] {
+    write_file_atomically(path_, "9876543210");
+    std::filesystem::last_write_time(path_, time);
+  };
+  EXPECT_THROW(rest(replace, "/file (deleted)"), IoError);
 }
 
 TEST_F(LineReaderTest, RefusesWhatIsNoFile) {
