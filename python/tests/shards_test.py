@@ -12,7 +12,7 @@ from support import REPOSITORY, Folder, Shards, seal
 from quadruped3d import Shard, ShardError, load, read_manifest
 from quadruped3d.shards import shard_files
 
-SCHEMA_1 = REPOSITORY / "tests" / "data" / "shards" / "schema_1.h5"
+SCHEMA_1, SCHEMA_2 = (REPOSITORY / "tests" / "data" / "shards" / f"schema_{number}.h5" for number in (1, 2))
 
 
 class Columns(Shards):
@@ -38,6 +38,12 @@ class Columns(Shards):
         self.assertEqual(list(labels["species"]), ["żubr", "red fox", "red fox"])
         self.assertEqual(labels["pose"].shape, (3, 35, 3, 3))
         self.assertEqual(Shard(SCHEMA_1).describe()["trans"]["units"], "SMAL units")
+
+    def test_schema_2_stays_readable(self):
+        labels = load(SCHEMA_2)
+        self.assertEqual(list(labels["species"]), ["żubr", "red fox", "red fox"])
+        self.assertTrue(np.isnan(labels["trust"][0]))
+        np.testing.assert_array_equal(labels["trust"][1:], [115.0, 215.0])
 
     def test_wrong_rows_and_names_are_told(self):
         shard = Shard(SCHEMA_1)

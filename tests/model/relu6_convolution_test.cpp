@@ -106,7 +106,7 @@ INSTANTIATE_TEST_SUITE_P(Shapes, Relu6Convolution,
                                            Case{"framed_on_both_sides", {1, 1, 0, 0}, 6, 70, false, {1, 2}},
                                            Case{"depthwise", {3, 1, 1, 1}, 70, 70, true, {}},
                                            Case{"depthwise_uneven", {5, 2, 1, 2}, 70, 70, true, {}}),
-                         [](const auto& info) { return info.param.name; });
+                         [](const auto& tried) { return tried.param.name; });
 
 TEST(Relu6ConvolutionFrame, IsForConvolutionsOfOnePixelAlone) {
   const torch::Tensor maps = torch::zeros({1, 2, 4, 4});

@@ -1,9 +1,9 @@
-// A shard of schema 1 that was written once and is committed: every later version must read it, and read the
-// same values.
+// Shards that were written once and are committed, one for each schema: every later version must read them,
+// and read the same values.
 //
-// tests/data/shards/schema_1.h5 was written by write_shard_main.cpp when schema 1 was current. Do not write
-// it anew: shards of that age are on other people's disks. The values below are what went into it; they are
-// stated here and not taken from shard_fixture.h, which may change with the schema.
+// write_shard_main.cpp wrote tests/data/shards/schema_N.h5 when schema N was current. Do not write them anew:
+// shards of that age are on other people's disks. The values below are what went into them; they are stated
+// here and not taken from shard_fixture.h, which may change with the schema.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -16,10 +16,6 @@
 
 namespace q3d::manifests {
 namespace {
-
-std::filesystem::path committed_shard() {
-  return testing::data_dir() / "shards" / "schema_1.h5";
-}
 
 std::string text_of(const std::vector<std::byte>& bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
@@ -63,29 +59,35 @@ void expect_arrays(const ShardSample& sample, int row) {
   expect_ramp("projected_2d", projected, 10 + above);
 }
 
-class Schema1 : public ::testing::Test {
+struct Committed {
+  int schema;
+  const char* sha256;
+};
+
+class CommittedShard : public ::testing::TestWithParam<Committed> {
  protected:
   void SetUp() override { ASSERT_EQ(shard_.samples.size(), 3U); }
 
   const SampleRecord& record(std::size_t row) const { return shard_.samples[row].record; }
 
-  Shard shard_ = read_shard(committed_shard());
+  std::filesystem::path path_ =
+      testing::data_dir() / "shards" / ("schema_" + std::to_string(GetParam().schema) + ".h5");
+  Shard shard_ = read_shard(path_);
 };
 
-TEST_F(Schema1, IsTheFileThatWasCommitted) {
-  EXPECT_EQ(sha256_file(committed_shard()),
-            "d5faed931ce65068de6a95dea5743b91a487f665bedb7d76f562b23ec8baa915");
+TEST_P(CommittedShard, IsTheFileThatWasCommitted) {
+  EXPECT_EQ(sha256_file(path_), GetParam().sha256);
 }
 
-TEST_F(Schema1, Header) {
-  EXPECT_EQ(shard_.header.schema, 1);
+TEST_P(CommittedShard, Header) {
+  EXPECT_EQ(shard_.header.schema, GetParam().schema);
   EXPECT_EQ(shard_.header.dataset, "quadruped3d");
   EXPECT_EQ(shard_.header.version, "0123456789ab");
   EXPECT_EQ(shard_.header.unit, 42);
   EXPECT_EQ(shard_.header.image_encoding, ImageEncoding::png);
 }
 
-TEST_F(Schema1, Records) {
+TEST_P(CommittedShard, Records) {
   const std::vector<std::string> ids{"world/train/img0.png#0", "world/train/img1.png#1",
                                      "world/train/img2.png#2"};
   const std::vector<std::string> image_refs{"img0.png", "img1.png", "img2.png"};
@@ -110,7 +112,7 @@ TEST_F(Schema1, Records) {
   }
 }
 
-TEST_F(Schema1, Pictures) {
+TEST_P(CommittedShard, Pictures) {
   const std::vector<std::string> digests{std::string(64, 'a'), std::string(64, 'b'), std::string(64, 'c')};
   const std::vector<std::string> crops{{"crop\0", 5}, {"crop\xff\0", 6}, {"crop\xff\xff\0", 7}};
   const std::vector<std::string> masks{"", "mask", ""};
@@ -127,7 +129,7 @@ TEST_F(Schema1, Pictures) {
   }
 }
 
-TEST_F(Schema1, Labels) {
+TEST_P(CommittedShard, Labels) {
   const std::vector<bool> has_keypoints_3d{false, true, false};
   for (std::size_t row = 0; row < 3; ++row) {
     SCOPED_TRACE(row);
@@ -140,7 +142,7 @@ TEST_F(Schema1, Labels) {
   }
 }
 
-TEST_F(Schema1, Judgements) {
+TEST_P(CommittedShard, Judgements) {
   const std::vector<double> initial_errors{0.25, 1.25, 2.25};
   const std::vector<double> final_errors{0.125, 1.125, 2.125};
   const std::vector<int> iterations{0, 10, 20};
@@ -156,16 +158,44 @@ TEST_F(Schema1, Judgements) {
     EXPECT_EQ(judgement.iterations, iterations[row]);
     EXPECT_EQ(judgement.best_iteration, best_iterations[row]);
   }
-  for (const TrustColumn& column : kTrustColumns) {
-    EXPECT_TRUE(std::isnan(shard_.samples[1].judgement.trust.*column.score))
-        << "schema 1 has no " << column.name;
-  }
   EXPECT_TRUE(std::isnan(shard_.samples[0].judgement.gain));
   EXPECT_EQ(shard_.samples[1].judgement.gain, 0.5);
   EXPECT_EQ(shard_.samples[2].judgement.gain, 0.5);
 }
 
-TEST_F(Schema1, Truth) {
+// Schema 2 added them.
+TEST_P(CommittedShard, TrustScores) {
+  for (std::size_t row = 0; row < 3; ++row) {
+    const bool is_measured = GetParam().schema >= 2 && row > 0;
+    double expected = 15.0 + 100.0 * static_cast<double>(row);  // 1 / 8 more in each column
+    for (const TrustColumn& column : kTrustColumns) {
+      SCOPED_TRACE(column.name);
+      const double score = shard_.samples[row].judgement.trust.*column.score;
+      if (is_measured) {
+        EXPECT_EQ(score, expected);
+      } else {
+        EXPECT_TRUE(std::isnan(score));
+      }
+      expected += 0.125;
+    }
+  }
+}
+
+TEST_P(CommittedShard, TermsOfTheDatasets) {
+  const auto& datasets = shard_.header.datasets;
+  if (GetParam().schema == 1) {
+    EXPECT_TRUE(datasets.empty());
+    return;
+  }
+  ASSERT_EQ(datasets.size(), 2U);
+  const auto& world = datasets.at("world/train");
+  EXPECT_EQ(world.licence, "CC0-1.0");
+  EXPECT_EQ(world.source_url, "https://example.org/world");
+  EXPECT_EQ(world.citation, "The \"world\" of 2026");
+  EXPECT_EQ(datasets.at("wild/test").licence, "");
+}
+
+TEST_P(CommittedShard, Truth) {
   EXPECT_FALSE(record(0).truth.has_value());
   EXPECT_FALSE(record(2).truth.has_value());
   ASSERT_TRUE(record(1).truth.has_value());
@@ -178,6 +208,12 @@ TEST_F(Schema1, Truth) {
   expect_ramp("truth_trans", truth.trans, 113);
   expect_ramp("truth_keypoints_3d", truth.keypoints_3d, 114);
 }
+
+INSTANTIATE_TEST_SUITE_P(
+    Schemas, CommittedShard,
+    ::testing::Values(Committed{1, "d5faed931ce65068de6a95dea5743b91a487f665bedb7d76f562b23ec8baa915"},
+                      Committed{2, "c70a0f00d7e6369389d19df721354a35e1fe0b4a9ffa711e77d0a82771c38ea2"}),
+    [](const auto& tried) { return "schema_" + std::to_string(tried.param.schema); });
 
 }  // namespace
 }  // namespace q3d::manifests
