@@ -6,9 +6,13 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <optional>
 #include <sstream>
 
 #include "loaders/keypoints/topology.h"
+#include "loaders/pictures/orientation.h"
+#include "loaders/pictures/picture_header.h"
+#include "pipeline/candidates/label_checks.h"
 #include "pipeline/candidates/list_file.h"
 #include "pipeline/run/errors.h"
 
@@ -47,6 +51,23 @@ bool read_point(const std::vector<std::string>& cells, CorrectedPoint& point) {
          point.v >= 0 && point.v <= 2;
 }
 
+// Looks at corrected labels as PictureFit looks at those of the file. A picture without a readable header is
+// left to decoding, which tells what is wrong with it.
+std::optional<LabelProblem> problem_of(const manifests::SampleRecord& record) {
+  if (!(record.box.w_px > 0.0 && record.box.h_px > 0.0)) {
+    return LabelProblem{
+        Reason::box_missing,
+        "got no box in the annotation file, and no keypoint in it to make one around; expected "
+        "a box, since corrections give keypoints alone"};
+  }
+  if (record.image_path.empty()) return std::nullopt;
+  const auto header = loaders::pictures::read_picture_header(std::filesystem::path(record.image_path));
+  if (!header) return std::nullopt;
+  const bool exchanges = loaders::pictures::exchanges_sides(record.orientation);
+  return find_label_problem(record, exchanges ? header->height_px : header->width_px,
+                            exchanges ? header->width_px : header->height_px);
+}
+
 void correct(const std::vector<CorrectedPoint>& points, manifests::SampleRecord& record) {
   if (record.failure != Reason::none && record.failure != Reason::no_visible_keypoints) return;
   for (const CorrectedPoint& point : points) {
@@ -57,6 +78,11 @@ void correct(const std::vector<CorrectedPoint>& points, manifests::SampleRecord&
                                       [](const auto& keypoint) { return keypoint.weight > 0.0F; });
   record.failure = is_visible ? Reason::none : Reason::no_visible_keypoints;
   record.failure_detail = is_visible ? "" : "corrections: no keypoint is labelled any more";
+  if (!is_visible) return;
+  if (const auto problem = problem_of(record)) {
+    record.failure = problem->reason;
+    record.failure_detail = "after the corrections: " + problem->detail;
+  }
 }
 
 }  // namespace

@@ -34,7 +34,11 @@ std::string corrections_text(const std::map<std::string, std::vector<CorrectedPo
 
 // Replaces the points of the records that are named. A corrected point has the weight 1, or 0 where v is 0.
 // A record that failed because no keypoint of it was labelled is sound again if one is now; a record without
-// a labelled keypoint fails as no_visible_keypoints. Adds to corrections.matched.
+// a labelled keypoint fails as no_visible_keypoints. Records that failed for another reason stay as they are.
+//
+// The records must have been compared with their pictures (picture_fit.h). A corrected record fails if its
+// labels cannot be meant on its picture (label_checks.h), and as box_missing if it has no box. Adds to
+// corrections.matched. Throws manifests::IoError for a picture that is there and cannot be read.
 void apply_corrections(Corrections& corrections, std::vector<manifests::SampleRecord>& records);
 
 }  // namespace q3d::pipeline::candidates

@@ -48,12 +48,18 @@ std::optional<double> uniform_factor(const Size& from, const Size& to) {
   return fits ? std::optional(factor) : std::nullopt;
 }
 
+// A record that failed because it has no labelled keypoint is fitted too, since corrections may give it some.
+bool is_fitted(const SampleRecord& record) {
+  const bool may_be_used = record.failure == Reason::none || record.failure == Reason::no_visible_keypoints;
+  return may_be_used && !record.image_path.empty();
+}
+
 using Headers = std::map<std::string, std::optional<PictureHeader>>;  // by path
 
 Headers read_headers(const std::vector<SampleRecord>& records) {
   Headers headers;
   for (const SampleRecord& record : records) {
-    if (record.failure == Reason::none && !record.image_path.empty()) headers[record.image_path];
+    if (is_fitted(record)) headers[record.image_path];
   }
   std::vector<Headers::value_type*> entries;
   for (auto& entry : headers) entries.push_back(&entry);
@@ -81,6 +87,7 @@ class HeaderFit {
     if (!fit_size(record, header, size)) return;
     record.width_px = record.width_px == 0 ? 0 : size.width_px;
     record.height_px = record.height_px == 0 ? 0 : size.height_px;
+    if (record.failure != Reason::none) return;  // it has no labels that could be looked at
     if (const auto problem = find_label_problem(record, size.width_px, size.height_px)) {
       record.failure = problem->reason;
       record.failure_detail = problem->detail;
@@ -181,7 +188,7 @@ void PictureFit::fit(std::vector<SampleRecord>& records) {
   const Headers headers = read_headers(records);
   HeaderFit fit(options_, notes_);
   for (SampleRecord& record : records) {
-    if (record.failure != Reason::none || record.image_path.empty()) continue;
+    if (!is_fitted(record)) continue;
     if (const auto& header = headers.at(record.image_path)) fit.fit(record, *header);
   }
 }

@@ -20,6 +20,9 @@ namespace q3d::pipeline::candidates {
 //   may be meant. With `resized: scale`, box and keypoints are scaled if width and height differ by one
 //   factor.
 // - A record whose labels cannot be meant on this picture fails (label_checks.h).
+// - A record that failed as `no_visible_keypoints` is fitted like the others, since corrections may give it
+//   keypoints. It keeps its reason unless its picture is too large or has another size. Other failed records
+//   stay as they are.
 // The notes say how many pictures have an EXIF orientation that is not used, how many records were scaled,
 // and how many have keypoints outside their picture. Records of pictures without a readable header stay as
 // they are: decoding tells what is wrong. Throws manifests::IoError for a picture that is there and cannot be

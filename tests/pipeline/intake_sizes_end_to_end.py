@@ -8,7 +8,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageOps
 
 from e2e import latest, run, write_json
-from e2e.intake import PLACES_OF_26, SIZE, IntakeCase, animal, coco, drawing, samples_with_pictures
+from e2e.intake import PLACES_OF_26, SIZE, TOPOLOGY, IntakeCase, animal, coco, drawing, samples_with_pictures
 
 
 def exif_block(orientation):
@@ -161,6 +161,17 @@ class Sizes(IntakeCase):
         for sample in samples:
             self.assert_on_dots(sample)
         self.assert_noted("the labels are scaled with it: 3 records")
+
+    def test_corrections_of_a_record_without_keypoints_lie_on_the_turned_picture(self):
+        self.draw_phone_picture("images/a.jpg", drawing(animal()), 6)
+        document = coco([("a.jpg", animal())])
+        document["annotations"][0].update(bbox=[40, 30, 190, 145], keypoints=[0] * 24)
+        self.write("labels.json", document)
+        names = {ours: theirs for theirs, ours in TOPOLOGY["animal3d26"].items()}
+        self.write("corrections.tsv", "".join(f"lab/train/a.jpg#0\t{names[point]}\t{x}\t{y}\t2\n"
+                                              for point, (x, y) in animal().items()))
+        sample, = self.build("--corrections", self.folder / "corrections.tsv", orientation="exif")
+        self.assert_on_dots(sample)
 
     def test_a_stretched_picture_is_refused_even_if_it_may_be_scaled(self):
         self.write("images/a.png", drawing(animal()).resize((150, 150)))
