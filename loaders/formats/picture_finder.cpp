@@ -190,11 +190,11 @@ FoundPicture PictureFinder::not_found(const std::vector<NameReading>& readings) 
     return {{},
             Reason::path_escapes_root,
             fmt::format("/{}, which is outside the root, and no file of its name is below {}",
-                        first.path.string(), bases_.front().string())};
+                        first.path.string(), name_for_people(bases_.front()))};
   }
   return {{},
           Reason::image_missing,
-          fmt::format("{}, which is not below {}", first.path.string(), bases_.front().string())};
+          fmt::format("{}, which is not below {}", first.path.string(), name_for_people(bases_.front()))};
 }
 
 std::optional<FoundPicture> PictureFinder::below_bases(const fs::path& relative) {
@@ -227,10 +227,10 @@ std::optional<FoundPicture> PictureFinder::by_spelling(const fs::path& relative)
     if (found == spellings.end()) continue;
     if (found->second.size() > 1) {
       const auto [first, last] = std::minmax_element(found->second.begin(), found->second.end());
-      return FoundPicture{
-          {},
-          Reason::image_missing,
-          fmt::format("{}, which could be {} or {}", relative.string(), first->string(), last->string())};
+      return FoundPicture{{},
+                          Reason::image_missing,
+                          fmt::format("{}, which could be {} or {}", relative.string(),
+                                      name_for_people(*first), name_for_people(*last))};
     }
     std::optional<FoundPicture> picture = existing(found->second.front());
     if (picture && picture->failure == Reason::none) ++found_by_spelling_;
@@ -250,7 +250,8 @@ std::optional<FoundPicture> PictureFinder::existing(const fs::path& path) {
     resolved = fs::canonical(path, error);
     require_answer(error, "resolve the link", path);
     if (error) {
-      return FoundPicture{{}, Reason::image_missing, fmt::format("{}, a link to nothing", path.string())};
+      return FoundPicture{
+          {}, Reason::image_missing, fmt::format("{}, a link to nothing", name_for_people(path))};
     }
     if (fs::is_directory(resolved, error)) return std::nullopt;
   } else {
@@ -264,9 +265,20 @@ std::optional<FoundPicture> PictureFinder::existing(const fs::path& path) {
   if (!lies_in_allowed(resolved)) {
     return FoundPicture{{},
                         Reason::path_escapes_root,
-                        fmt::format("{}, a link to {} outside the root", path.string(), resolved.string())};
+                        fmt::format("{}, a link that leads outside the root", name_for_people(path))};
   }
   return FoundPicture{resolved, Reason::none, {}};
+}
+
+// Names a path without the folders of this machine, since the text becomes part of a dataset.
+std::string PictureFinder::name_for_people(const fs::path& path) const {
+  for (const fs::path& folder : allowed_) {
+    if (!lies_in(path, folder)) continue;
+    const std::string relative = path.lexically_relative(folder).generic_string();
+    if (relative != ".") return relative;
+    return folder == root_ ? "the root" : "the folder of pictures";
+  }
+  return path.string();
 }
 
 bool PictureFinder::lies_in_allowed(const fs::path& path) const {

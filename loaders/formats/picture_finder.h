@@ -19,7 +19,7 @@ namespace q3d::loaders::formats {
 struct FoundPicture {
   std::filesystem::path path;  // absolute, with links resolved; empty if it was not found
   manifests::Reason failure = manifests::Reason::none;
-  std::string got;  // for people: where the name led to
+  std::string got;  // for people: where the name led to, with paths relative to the root
 };
 
 // The folders that names count from. All of them are relative to the root unless they are absolute.
@@ -75,6 +75,7 @@ class PictureFinder {
   std::optional<FoundPicture> find_by_spelling(const NameReading& reading);
   FoundPicture not_found(const std::vector<NameReading>& readings) const;
   const Spellings& spellings_below(const std::filesystem::path& base);
+  std::string name_for_people(const std::filesystem::path& path) const;
   bool lies_in_allowed(const std::filesystem::path& path) const;
 
   std::filesystem::path root_;

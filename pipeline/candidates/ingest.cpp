@@ -22,6 +22,7 @@
 #include "pipeline/candidates/body_check.h"
 #include "pipeline/candidates/configured_dataset.h"
 #include "pipeline/candidates/duplicates.h"
+#include "pipeline/candidates/local_folders.h"
 #include "pipeline/candidates/picture_fit.h"
 #include "pipeline/run/interrupt.h"
 
@@ -72,15 +73,6 @@ class UniqueIds {
   };
   std::deque<Hashed> ids_;
 };
-
-// Paths of this machine do not belong into a dataset: equal builds in different folders have equal verdicts.
-std::string without_root(std::string text, const std::filesystem::path& root) {
-  const std::string prefix = (root / "").string();
-  for (std::size_t at = text.find(prefix); at != std::string::npos; at = text.find(prefix, at)) {
-    text.erase(at, prefix.size());
-  }
-  return text;
-}
 
 std::string note_of(const Corrections& corrections, const std::filesystem::path& file) {
   return fmt::format(
@@ -271,17 +263,18 @@ std::string dataset_key(const manifests::SampleRecord& record) {
 IngestedDataset stream_dataset(const config::DatasetConfig& options, manifests::DigestCache& digests,
                                const loaders::formats::TakeRecords& take) {
   PictureFit fit(options);
+  const LocalFolders folders(options);
   loaders::formats::Dataset dataset =
       stream_configured(options, [&](std::vector<manifests::SampleRecord>&& records) {
         run::throw_if_interrupted();
         fit.fit(records);
         for (auto& record : records) {
-          record.failure_detail = without_root(std::move(record.failure_detail), options.root);
+          record.failure_detail = folders.without(std::move(record.failure_detail));
         }
         take(std::move(records));
       });
   for (auto& note : fit.notes()) dataset.notes.push_back(std::move(note));
-  for (auto& note : dataset.notes) note.text = without_root(std::move(note.text), options.root);
+  for (auto& note : dataset.notes) note.text = folders.without(std::move(note.text));
   std::string digest = digest_files(dataset.files, digests);
   return {std::move(dataset), std::move(digest)};
 }

@@ -77,6 +77,24 @@ TEST_F(Finder, in_one_folder_alone) {
   EXPECT_EQ(here.relative_to_root(root().parent_path()), "");
 }
 
+// Messages become parts of verdicts, which are equal wherever the dataset lies.
+TEST_F(Finder, messages_name_folders_relative_to_the_root) {
+  make("a.png");
+  std::filesystem::create_symlink("gone.png", root() / "link.png");
+  EXPECT_EQ(finder().find("b.png").got, "b.png, which is not below the root");
+  EXPECT_EQ(finder().find("link.png").got, "link.png, a link to nothing");
+  EXPECT_EQ(finder().find("/x/b.png").got,
+            "/x/b.png, which is outside the root, and no file of its name is below the root");
+  make("images/c.png");
+  EXPECT_EQ(finder().find("b.png").got, "b.png, which is not below images");
+  const std::filesystem::path pictures = root().parent_path() / "pictures";
+  write_picture(pictures / "d.png");
+  std::filesystem::create_symlink("../secret.png", pictures / "out.png");
+  write_picture(root().parent_path() / "secret.png");
+  EXPECT_EQ(finder(pictures.string()).find("b.png").got, "b.png, which is not below the folder of pictures");
+  EXPECT_EQ(finder(pictures.string()).find("out.png").got, "out.png, a link that leads outside the root");
+}
+
 TEST_F(Finder, nothing_outside_the_root_is_found_in_any_spelling) {
   make("images/a.png");
   write_picture(root().parent_path() / "secret.png");

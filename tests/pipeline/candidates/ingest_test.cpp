@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/candidates/local_folders.h"
 #include "tests/loaders/formats/annotation_files.h"
 #include "tests/support/paths.h"
 
@@ -142,6 +143,70 @@ TEST(ApplyCorrections, ARecordWithoutABoxIsRefused) {
   apply_corrections(corrections, records);
   EXPECT_EQ(records[0].failure, Reason::box_missing);
   EXPECT_THAT(records[0].failure_detail, HasSubstr("got no box in the annotation file"));
+}
+
+class Moved : public IngestTest {
+ protected:
+  // Records of a missing picture, of a link to nothing, and one whose box has three numbers.
+  static void write_bad_records(const fs::path& place) {
+    json no_box = prima_record(kPicture);
+    no_box["bbox"] = {1, 2, 3};
+    write_picture(place / kPicture);
+    fs::create_symlink("nothing.png", place / "images/link.png");
+    write_records(place, {prima_record("images/gone.png"), prima_record("images/link.png"), no_box});
+  }
+  // All details and notes, one a line.
+  std::string said(const fs::path& place, const json& keys = json::object()) const {
+    const Ingest found = taken(place, keys);
+    std::string text;
+    found.candidates.for_each(
+        [&](std::size_t, const Candidate& candidate) { text += candidate.record.failure_detail + "\n"; });
+    for (const IngestNote& note : found.notes) text += note.text + "\n";
+    return text;
+  }
+};
+
+TEST_F(Moved, WhatIsSaidNamesNoFolderOfThisMachine) {
+  write_bad_records(root());
+  write_bad_records(folder() / "further/down");
+  const std::string expected = said(root());
+  EXPECT_THAT(expected, HasSubstr("train.json: data[0].img_path: got images/gone.png, which is not below the "
+                                  "root, expected a picture below the dataset's root"));
+  EXPECT_THAT(expected, HasSubstr("train.json: data[2].bbox: got "));
+  EXPECT_THAT(expected, ::testing::Not(HasSubstr(folder().string())));
+  EXPECT_EQ(said(folder() / "further/down"), expected);
+}
+
+TEST_F(Moved, ARootBehindALinkIsNotNamed) {
+  write_bad_records(root());
+  fs::create_directory_symlink(root(), folder() / "link");
+  EXPECT_EQ(said(folder() / "link"), said(root()));
+  EXPECT_THAT(said(folder() / "link"), ::testing::Not(HasSubstr(folder().string())));
+}
+
+TEST_F(Moved, PicturesAndAnnotationsOutsideTheRootAreNotNamed) {
+  write_bad_records(root());
+  write_bad_records(folder() / "labels");
+  const std::string text = said(root(), {{"images", (folder() / "labels").string()},
+                                         {"annotations", (folder() / "labels/train.json").string()}});
+  EXPECT_THAT(text,
+              HasSubstr("train.json: data[0].img_path: got images/gone.png, which is not below the folder "
+                        "of pictures"));
+  EXPECT_THAT(text, ::testing::Not(HasSubstr(folder().string())));
+}
+
+TEST(LocalFoldersTest, AFolderIsAPathOfItsOwn) {
+  const testing::ScratchDir scratch;
+  fs::create_directories(scratch.path() / "dogs");
+  loaders::formats::DatasetOptions options;
+  options.root = scratch.path() / "dogs/";
+  const LocalFolders folders(options);
+  const std::string root = (scratch.path() / "dogs").string();
+  EXPECT_EQ(folders.without(root + "/a.json: got \"" + root + "/b.png\""), "a.json: got \"b.png\"");
+  EXPECT_EQ(folders.without("a folder " + root + ", and " + root + "/"), "a folder the root, and the root");
+  for (const std::string& other : {root + "2/a.png", "/mnt" + root + "/a.png", "file://" + root + "/a.png"}) {
+    EXPECT_EQ(folders.without("got " + other), "got " + other);
+  }
 }
 
 }  // namespace
