@@ -16,8 +16,8 @@ void to_json(nlohmann::json& object, const SampleRecord& record);
 void from_json(const nlohmann::json& object, SampleRecord& record);
 
 // Returns the SHA-256 of everything in the record that can change a label. Absolute paths and failure_detail
-// are left out, so that a dataset keeps its digests when it is moved. The bytes of picture and mask are
-// digested separately.
+// are left out, so that a dataset keeps its digests when it is moved. The bytes of picture and mask, and
+// the detail of a failure without this machine's paths, are digested separately.
 std::string record_digest(const SampleRecord& record);
 
 }  // namespace q3d::manifests

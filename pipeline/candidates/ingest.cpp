@@ -119,7 +119,8 @@ std::map<std::string, std::string> texts_of_terms(const config::BuildConfig& con
   return texts;
 }
 
-// Digests a unit's records, pictures, masks and roles, and the terms of its datasets.
+// Digests a unit's records with the details of their failures, pictures, masks and roles, and the terms of
+// its datasets.
 void digest_unit(const std::vector<Candidate>& candidates, const std::map<std::string, std::string>& terms,
                  Unit& unit) {
   std::string text;
@@ -129,6 +130,8 @@ void digest_unit(const std::vector<Candidate>& candidates, const std::map<std::s
             candidate.mask_sha256 + ' ';
     text += std::string(to_string(candidate.role)) + '\n';
     if (!candidate.finding.empty()) text += candidate.finding + '\n';
+    // verdicts.csv repeats it, so two details are two versions.
+    if (candidate.record.failure != Reason::none) text += candidate.record.failure_detail + '\n';
     const auto found = terms.find(dataset_key(candidate.record));
     if (found != terms.end()) own_terms.insert(*found);
   }

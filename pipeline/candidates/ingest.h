@@ -26,7 +26,7 @@ struct Unit {
   std::int64_t index = 0;
   std::size_t first = 0;  // into Ingest::candidates
   std::size_t count = 0;
-  std::string input_digest;  // over the records, pictures, masks and roles of the unit
+  std::string input_digest;  // over the records, what is wrong with them, pictures, masks and roles
   // The same, and over the terms of the unit's datasets and what is left out: shards depend on these,
   // predictions do not.
   std::string label_digest;

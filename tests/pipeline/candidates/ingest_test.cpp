@@ -195,6 +195,28 @@ TEST_F(Moved, PicturesAndAnnotationsOutsideTheRootAreNotNamed) {
   EXPECT_THAT(text, ::testing::Not(HasSubstr(folder().string())));
 }
 
+TEST_F(Moved, TheUnitsKeepTheirDigests) {
+  write_bad_records(root());
+  write_bad_records(folder() / "further/down");
+  EXPECT_EQ(taken(root()).units.at(0).input_digest,
+            taken(folder() / "further/down").units.at(0).input_digest);
+}
+
+// A version has the details of its failures in verdicts.csv.
+TEST_F(IngestTest, AnotherDetailOfAFailureIsAnotherInput) {
+  write_records(root(), {prima_record(kPicture)});
+  const auto taken_with = [&](int width_px) {
+    write_picture(root() / kPicture, width_px, 48);
+    return taken(root());
+  };
+  const Ingest wide = taken_with(70);
+  const Ingest wider = taken_with(80);
+  EXPECT_EQ(wide.candidates.at(0).record.failure, Reason::size_mismatch);
+  EXPECT_EQ(wider.candidates.at(0).record.failure, Reason::size_mismatch);
+  EXPECT_NE(wide.units.at(0).input_digest, wider.units.at(0).input_digest);
+  EXPECT_EQ(wide.units.at(0).input_digest, taken_with(70).units.at(0).input_digest);
+}
+
 TEST(LocalFoldersTest, AFolderIsAPathOfItsOwn) {
   const testing::ScratchDir scratch;
   fs::create_directories(scratch.path() / "dogs");
