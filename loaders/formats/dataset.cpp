@@ -12,6 +12,7 @@
 #include "loaders/formats/formats.h"
 #include "loaders/keypoints/builtin_topologies.h"
 #include "loaders/pictures/box.h"
+#include "manifests/valid_utf8.h"
 
 namespace q3d::loaders::formats {
 namespace {
@@ -61,6 +62,13 @@ const Format& format_of(const DatasetOptions& options) {
   }
   throw std::invalid_argument(
       fmt::format("dataset {}: format: got \"{}\", expected one of {}", options.name, options.format, known));
+}
+
+// Notes name files, and are written as JSON.
+std::vector<Note> valid_notes(const Notes& notes) {
+  std::vector<Note> list = notes.list();
+  for (Note& note : list) note.text = manifests::valid_utf8(note.text);
+  return list;
 }
 
 }  // namespace
@@ -113,10 +121,17 @@ void set_found_picture(Loading& loading, RecordReader& reader, const PictureName
                        const FoundPicture& found, const std::string& annotation, SampleRecord& sample) {
   sample.dataset = loading.options.name;
   sample.split = loading.options.split;
-  sample.image_ref = bounded_text(name.name);
-  sample.id = fmt::format("{}/{}/{}#{}", sample.dataset, sample.split, id_part(sample.image_ref),
-                          bounded_text(annotation));
+  const std::string valid_name = manifests::valid_utf8(name.name);
+  sample.image_ref = bounded_text(valid_name);
+  const std::string picture = bounded_text(manifests::valid_utf8(id_part(bounded_text(name.name))));
+  sample.id = fmt::format("{}/{}/{}#{}", sample.dataset, sample.split, picture, bounded_text(annotation));
   if (reader.failed()) return;
+  if (valid_name != name.name) {
+    reader.fail(Reason::record_malformed, name.field,
+                fmt::format("\"{}\", a name with bytes that are no UTF-8", sample.image_ref),
+                "a name in the encoding UTF-8; rename the picture or its folder");
+    return;
+  }
   if (found.failure == Reason::none) {
     sample.image_path = found.path.string();
   } else {
@@ -223,7 +238,7 @@ Dataset finished(Loading& loading, std::vector<SampleRecord> records) {
   std::vector<std::filesystem::path> files{loading.file};
   std::copy_if(loading.more_files.begin(), loading.more_files.end(), std::back_inserter(files),
                [](const std::filesystem::path& file) { return !keypoints::is_builtin_topology(file); });
-  return {std::move(records), loading.notes.list(), std::move(files)};
+  return {std::move(records), valid_notes(loading.notes), std::move(files)};
 }
 
 }  // namespace q3d::loaders::formats

@@ -62,7 +62,8 @@ std::vector<std::string> dataset_formats();
 bool takes_topology(const std::string& format);
 
 // Loads a dataset. Sample ids are name/split/picture#annotation. The annotation is its id if all ids in the
-// file are distinct, else its index.
+// file are distinct, else its index. A record whose picture has a name that is not UTF-8 fails as
+// record_malformed; ids, details and notes have its bytes written out (manifests/valid_utf8.h).
 //
 // Throws std::invalid_argument for options that make no sense. Throws std::runtime_error that names the file
 // and the place, what was found and what was expected, if the file as a whole cannot be read (absent, cut

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "manifests/json_file.h"
+#include "manifests/valid_utf8.h"
 
 namespace q3d::loaders::formats {
 namespace {
@@ -38,8 +39,8 @@ void RecordReader::fail(Reason reason, std::string_view field, std::string_view 
                         std::string_view expected) {
   if (failed()) return;
   sample_.failure = reason;
-  sample_.failure_detail =
-      fmt::format("{}{}{}: got {}, expected {}", where_, field.empty() ? "" : ".", field, got, expected);
+  sample_.failure_detail = manifests::valid_utf8(
+      fmt::format("{}{}{}: got {}, expected {}", where_, field.empty() ? "" : ".", field, got, expected));
 }
 
 std::string RecordReader::text(const std::string& field) {

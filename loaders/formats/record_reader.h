@@ -24,6 +24,7 @@ class RecordReader {
 
   bool has(const std::string& field) const;  // true if the field exists and is not null
   bool failed() const { return sample_.failure != manifests::Reason::none; }
+  // Paths in a detail need not be UTF-8; bytes that are none are written out (manifests/valid_utf8.h).
   void fail(manifests::Reason reason, std::string_view field, std::string_view got,
             std::string_view expected);
 

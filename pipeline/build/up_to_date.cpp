@@ -45,22 +45,30 @@ std::int64_t tick_of(std::int64_t time_ns) {
   return time_ns % manifests::kNsPerSecond == 0 ? kCoarseTickNs : kTickNs;
 }
 
+// Appends a text with its length before it. Paths may hold any bytes, which JSON does not take.
+void append_text(const std::string& text, std::string& request) {
+  request += fmt::format("{}:", text.size());
+  request += text;
+}
+
 // A digest of what the user asks for, and of the output folder's place: in a copy of the folder, the record
 // would speak of the files of the other one. The program's own stamp stands for its code.
 std::string request_digest(const fs::path& out, const config::BuildConfig& config,
                            const config::JudgingRules& rules, const std::string& device_key) {
-  json datasets = json::array();
+  const json settings{{"form", kForm},
+                      {"config", config.as_written},
+                      {"stages", stages::keys_of_config(config, rules, {}, device_key).shards}};
+  std::string request;
+  append_text(settings.dump(), request);
+  append_text(fs::weakly_canonical(out).string(), request);
   for (const config::DatasetConfig& dataset : config.datasets) {
-    datasets.push_back({dataset.name, dataset.split, fs::absolute(dataset.root).string()});
+    for (const std::string& text : {dataset.name, dataset.split, fs::absolute(dataset.root).string()}) {
+      append_text(text, request);
+    }
   }
-  const json request{{"form", kForm},
-                     {"out", fs::weakly_canonical(out).string()},
-                     {"config", config.as_written},
-                     {"stages", stages::keys_of_config(config, rules, {}, device_key).shards},
-                     {"datasets", datasets},
-                     {"veto", config.veto.string()},
-                     {"corrections", config.corrections.string()}};
-  return manifests::sha256(request.dump());
+  append_text(config.veto.string(), request);
+  append_text(config.corrections.string(), request);
+  return manifests::sha256(request);
 }
 
 void add(PathTable& paths, const fs::path& path) {

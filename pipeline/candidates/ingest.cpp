@@ -19,6 +19,7 @@
 #include "manifests/atomic_file.h"
 #include "manifests/json_parse.h"
 #include "manifests/record_json.h"
+#include "manifests/valid_utf8.h"
 #include "pipeline/candidates/body_check.h"
 #include "pipeline/candidates/configured_dataset.h"
 #include "pipeline/candidates/duplicates.h"
@@ -77,7 +78,8 @@ class UniqueIds {
 std::string note_of(const Corrections& corrections, const std::filesystem::path& file) {
   return fmt::format(
       "corrections {}: the keypoints of {} candidates are replaced; {} of its ids are no candidate's",
-      file.filename().string(), corrections.matched, corrections.points.size() - corrections.matched);
+      manifests::valid_utf8(file.filename().string()), corrections.matched,
+      corrections.points.size() - corrections.matched);
 }
 
 // A label must have what its role promises.

@@ -4,6 +4,8 @@
 #include <string_view>
 #include <system_error>
 
+#include "manifests/valid_utf8.h"
+
 namespace q3d::pipeline::candidates {
 namespace {
 
@@ -31,7 +33,7 @@ void LocalFolders::add(const fs::path& folder, const std::string& name) {
 }
 
 void LocalFolders::add_path(const fs::path& folder, const std::string& name) {
-  std::string path = folder.string();
+  std::string path = manifests::valid_utf8(folder.string());  // as details and notes have it
   while (path.size() > 1 && path.back() == '/') path.pop_back();
   const bool is_known =
       std::any_of(folders_.begin(), folders_.end(), [&](const Folder& known) { return known.path == path; });

@@ -4,6 +4,7 @@
 
 #include <cstdio>
 
+#include "manifests/valid_utf8.h"
 #include "pipeline/dataset/sentences.h"
 #include "pipeline/run/command_line.h"
 #include "pipeline/run/progress_text.h"
@@ -73,7 +74,7 @@ nlohmann::ordered_json to_json(const build::BuildSummary& summary) {
           {"failed", counts.failed},
           {"labels", to_json(summary.dataset.labels)},
           {"shards", summary.dataset.shards.size()},
-          {"dataset", summary.folder.string()},
+          {"dataset", manifests::valid_utf8(summary.folder.string())},
           {"content_id", summary.dataset.content_id},
           {"reasons", to_json(summary.dataset.reasons)},
           {"notes", dataset::notes_json(summary.notes)},
@@ -120,7 +121,7 @@ nlohmann::ordered_json to_json(const build::DryRun& forecast) {
   for (const build::StageForecast& stage : forecast.stages) {
     stages.push_back({{"stage", to_string(stage.stage)},
                       {"key", stage.key},
-                      {"folder", stage.folder.string()},
+                      {"folder", manifests::valid_utf8(stage.folder.string())},
                       {"units_reused", stage.reused},
                       {"units_made", stage.made},
                       {"units_not_needed", stage.not_needed},

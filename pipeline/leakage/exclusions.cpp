@@ -5,6 +5,7 @@
 #include <map>
 #include <utility>
 
+#include "manifests/valid_utf8.h"
 #include "pipeline/leakage/leakage.h"
 #include "pipeline/leakage/leakage_lists.h"
 
@@ -62,11 +63,11 @@ void apply_veto(const std::filesystem::path& file, candidates::Ingest& ingest) {
   for (auto& [index, exclusion] : vetoed) ingest.candidates.exclude(index, std::move(exclusion));
   veto.matched = vetoed.size();
   if (veto.matched < veto.reasons.size()) {
-    ingest.notes.push_back(
-        {loaders::formats::NoteKind::caution,
-         {},
-         fmt::format("veto {}: {} of its {} ids are no candidate's", file.filename().string(),
-                     veto.reasons.size() - veto.matched, veto.reasons.size())});
+    ingest.notes.push_back({loaders::formats::NoteKind::caution,
+                            {},
+                            fmt::format("veto {}: {} of its {} ids are no candidate's",
+                                        manifests::valid_utf8(file.filename().string()),
+                                        veto.reasons.size() - veto.matched, veto.reasons.size())});
   }
 }
 

@@ -13,6 +13,7 @@
 #include "manifests/file_name.h"
 #include "manifests/json_number.h"
 #include "manifests/sealed_json.h"
+#include "manifests/valid_utf8.h"
 #include "pipeline/run/log.h"
 #include "pipeline/stages/made_from.h"
 #include "pipeline/stages/stage.h"
@@ -38,6 +39,13 @@ ordered_json stages_json(const BuildPlan& plan) {
   return stages;
 }
 
+// The command's words may be paths of any bytes.
+ordered_json command_json(const BuildPlan& plan) {
+  ordered_json words = ordered_json::array();
+  for (const std::string& word : plan.command) words.push_back(manifests::valid_utf8(word));
+  return words;
+}
+
 std::string text_of(const BuildPlan& plan) {
   ordered_json units = ordered_json::array();
   for (const PlannedUnit& unit : plan.units) {
@@ -47,7 +55,7 @@ std::string text_of(const BuildPlan& plan) {
                                  {"name", plan.name},
                                  {"key", plan.keys.dataset},
                                  {"candidates", plan.candidates},
-                                 {"command", plan.command},
+                                 {"command", command_json(plan)},
                                  {"stages", stages_json(plan)},
                                  {"units", units}};
   return manifests::seal_json(document);

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <string_view>
 
+#include "manifests/valid_utf8.h"
 #include "pipeline/run/command_line.h"
 #include "pipeline/run/words.h"
 #include "pipeline/stages/stages.h"
@@ -130,10 +131,15 @@ std::string build_page(const BuildStatus& build) {
                                                      run::command_line(build.command)));
 }
 
+// A path as JSON takes it.
+std::string text_of(const std::filesystem::path& path) {
+  return manifests::valid_utf8(path.string());
+}
+
 ordered_json to_json(const StageStatus& stage) {
   return {{"stage", to_string(stage.stage)},
           {"key", stage.key},
-          {"manifest", stage.manifest.empty() ? ordered_json() : ordered_json(stage.manifest.string())},
+          {"manifest", stage.manifest.empty() ? ordered_json() : ordered_json(text_of(stage.manifest))},
           {"manifest_is_there", stage.has_manifest},
           {"units_finished", stage.finished},
           {"units_missing", stage.missing},
@@ -145,14 +151,14 @@ ordered_json to_json(const dataset::ExportStatus& status) {
   return {{"format", status.listed.format},
           {"version", status.listed.version},
           {"key", status.key},
-          {"folder", status.listed.folder.string()},
+          {"folder", text_of(status.listed.folder)},
           {"state", words_of(status.state)},
           {"pictures_anyway", status.listed.pictures_anyway},
           {"damaged", status.damaged}};
 }
 
 ordered_json to_json(const ResultStatus& result) {
-  return {{"manifest", result.manifest.string()}, {"is_there", result.is_there}};
+  return {{"manifest", text_of(result.manifest)}, {"is_there", result.is_there}};
 }
 
 }  // namespace
@@ -185,6 +191,8 @@ std::string page(const FolderStatus& status) {
 ordered_json to_json(const BuildStatus& build) {
   ordered_json stages = ordered_json::array();
   for (const StageStatus& stage : build.stages) stages.push_back(to_json(stage));
+  ordered_json command = ordered_json::array();
+  for (const std::string& word : build.command) command.push_back(manifests::valid_utf8(word));
   return {{"version", build.version},
           {"key", build.key},
           {"latest", build.is_latest},
@@ -196,7 +204,7 @@ ordered_json to_json(const BuildStatus& build) {
           {"stages", stages},
           {"dataset", to_json(build.dataset)},
           {"report", to_json(build.report)},
-          {"command", build.command}};
+          {"command", command}};
 }
 
 ordered_json to_json(const FolderStatus& status) {
@@ -204,12 +212,12 @@ ordered_json to_json(const FolderStatus& status) {
   for (const BuildStatus& build : status.builds) builds.push_back(to_json(build));
   ordered_json others = ordered_json::array();
   for (const OtherStage& other : status.others) {
-    others.push_back({{"folder", other.folder.string()}, {"units", other.units}});
+    others.push_back({{"folder", text_of(other.folder)}, {"units", other.units}});
   }
   ordered_json exports = ordered_json::array();
   for (const dataset::ExportStatus& each : status.exports) exports.push_back(to_json(each));
   return {
-      {"folder", status.out.string()}, {"builds", builds}, {"other_stages", others}, {"exports", exports}};
+      {"folder", text_of(status.out)}, {"builds", builds}, {"other_stages", others}, {"exports", exports}};
 }
 
 }  // namespace q3d::pipeline::status

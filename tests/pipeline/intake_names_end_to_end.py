@@ -1,6 +1,12 @@
 """The program on label files that name their pictures in other ways, or by the numbers of frames."""
 
+import json
+import os
+
+from e2e import latest, run
 from e2e.intake import IntakeCase, animal, coco, dlc_rows, drawing
+
+LATIN_1 = os.fsdecode(b"caf\xe9")  # a name that is no UTF-8
 
 
 class Frames(IntakeCase):
@@ -109,3 +115,32 @@ class PictureNames(IntakeCase):
         self.assertEqual(len(self.build(root=str(self.folder / "data"))), 1)
         for reason, _ in self.failures():
             self.assertIn(reason, ("path_escapes_root", "image_missing"))
+
+
+class BytesThatAreNoUtf8(IntakeCase):
+    def test_a_folder_of_labels(self):
+        for folder, dx in (("walk", 0), (LATIN_1, 30)):
+            self.write(f"labeled-data/{folder}/img1.png", drawing(animal(dx=dx)))
+            for scorer in ("Ada", "Adawindows"):
+                self.write(f"labeled-data/{folder}/CollectedData_{scorer}.csv", dlc_rows([("img1.png", animal(dx=dx))]))
+        sample, = self.build("--quiet", format="deeplabcut", annotations="labeled-data")
+        self.assert_on_dots(sample)
+        (reason, detail), = self.failures()
+        self.assertEqual(reason, "record_malformed")
+        self.assertIn("labeled-data/caf\\xe9/img1.png", detail)
+        self.assert_noted("labeled-data/caf\\xe9: CollectedData_Ada.csv is read")
+
+    def test_a_working_folder(self):
+        self.folder = self.folder / LATIN_1
+        self.folder.mkdir()
+        self.write("images/a.png", drawing(animal()))
+        self.write("labels.json", coco([("a.png", animal())]))
+        config = self.config(root=".")
+        out = self.folder / "out"
+        words = ["build", "--config", config, "--out", out, "--json"]
+        summaries = [json.loads(run(*words, errors="backslashreplace").stdout) for _ in range(2)]
+        self.assertEqual([summary["candidates"] for summary in summaries], [1, 1])
+        self.assertEqual([summary["up_to_date"] for summary in summaries], [False, True])
+        self.assertTrue(summaries[0]["dataset"].endswith("caf\\xe9/out/" + latest(out).name))
+        run("verify", latest(out), errors="backslashreplace")
+        run("status", out, "--json", errors="backslashreplace")

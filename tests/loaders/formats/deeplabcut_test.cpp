@@ -178,6 +178,30 @@ TEST(DeepLabCut, a_picture_in_two_rows_is_told_apart_by_number) {
   EXPECT_EQ(dataset.records[1].id, "lab/train/labeled-data/walk/img000.png#1");
 }
 
+// Ids and notes are written as JSON, which holds UTF-8 alone.
+TEST(DeepLabCut, a_folder_whose_name_is_no_utf8_fails_its_records) {
+  Project project;
+  const auto labels = project.root() / "labeled-data/caf\xe9";
+  write_picture(labels / "img1.png");
+  for (const char* name : {"CollectedData_Ada.csv", "CollectedData_Adawindows.csv"}) {
+    write_text(labels / name,
+               "scorer,A,A,A,A,A,A,A,A\nbodyparts,snout,snout,eye_l,eye_l,eye_r,eye_r,horn,horn\n"
+               "coords,x,y,x,y,x,y,x,y\nimg1.png,1,2,3,4,50,60,7,8\n");
+  }
+  project.options.annotations = "labeled-data";
+  const Dataset dataset = load_dataset(project.options);
+  ASSERT_EQ(dataset.records.size(), 1U);
+  const SampleRecord& record = dataset.records[0];
+  EXPECT_EQ(record.failure, Reason::record_malformed);
+  EXPECT_EQ(record.id, "lab/train/labeled-data/caf\\xe9/img1.png#0");
+  EXPECT_EQ(record.image_ref, "labeled-data/caf\\xe9/img1.png");
+  EXPECT_THAT(record.failure_detail,
+              HasSubstr("got \"labeled-data/caf\\xe9/img1.png\", a name with bytes that are no UTF-8"));
+  EXPECT_NO_THROW(json(record.failure_detail).dump());
+  EXPECT_THAT(joined(dataset.notes), HasSubstr("caf\\xe9: CollectedData_Ada.csv is read"));
+  EXPECT_NO_THROW(json(joined(dataset.notes)).dump());
+}
+
 TEST(LabelHdf5, refuses_what_is_no_frame) {
   const q3d::testing::ScratchDir scratch;
   const std::string whole = [] {

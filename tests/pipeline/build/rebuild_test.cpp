@@ -214,6 +214,17 @@ TEST_F(Rebuild, CellsThatASpreadsheetWouldRunAreToldAndStayAsTheyAre) {
   EXPECT_THAT(told_, Contains(HasSubstr("6 cells of verdicts.csv begin with =, +, - or @")));
 }
 
+// A path may hold any bytes but zero; JSON takes UTF-8 alone.
+TEST_F(Rebuild, AnOutputFolderWhoseNameIsNoUtf8IsBuiltInto) {
+  run::RunOptions options;
+  options.out = scratch_.path() / "caf\xe9";
+  options.quiet = true;
+  BuildRequest request;
+  request.command = {"build", "--out", options.out.string()};
+  EXPECT_FALSE(build(config(), options, request).was_up_to_date);
+  EXPECT_TRUE(build(config(), options, request).was_up_to_date);
+}
+
 TEST_F(Rebuild, APictureThatIsNotThereIsAFailedSample) {
   fs::remove(scratch_.path() / "data/images/p3.png");
   const BuildSummary summary = run("out");

@@ -217,6 +217,13 @@ TEST_F(IngestTest, AnotherDetailOfAFailureIsAnotherInput) {
   EXPECT_EQ(wide.units.at(0).input_digest, taken_with(70).units.at(0).input_digest);
 }
 
+TEST_F(Moved, ARootWhoseNameIsNoUtf8IsNotNamed) {
+  write_bad_records(root());
+  const fs::path latin = folder() / "caf\xe9";
+  write_bad_records(latin);
+  EXPECT_EQ(said(latin), said(root()));
+}
+
 TEST(LocalFoldersTest, AFolderIsAPathOfItsOwn) {
   const testing::ScratchDir scratch;
   fs::create_directories(scratch.path() / "dogs");

@@ -64,6 +64,14 @@ TEST(MadeFrom, EveryKeyIsTheDigestOfItsText) {
   }
 }
 
+TEST(BuildPlan, WritesBytesOfItsCommandThatAreNoUtf8Out) {
+  const testing::ScratchDir scratch;
+  BuildPlan plan = Inputs().plan();
+  plan.command = {"build", "--out", "caf\xe9"};
+  write_build_plan(scratch.path(), plan);
+  EXPECT_THAT(read_build_plans(scratch.path()).at(0).command, ElementsAre("build", "--out", "caf\\xe9"));
+}
+
 TEST(BuildPlan, ComesBackFromItsFile) {
   const testing::ScratchDir scratch;
   const BuildPlan plan = Inputs().plan();
