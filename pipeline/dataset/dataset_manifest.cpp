@@ -149,7 +149,7 @@ ordered_json VerdictBooks::to_json(const Groups& groups) {
 }
 
 ordered_json VerdictBooks::statistics_json() const {
-  ordered_json object = counts_.candidates == 0 ? ordered_json::object() : to_json({{"all", all_}});
+  ordered_json object = to_json({{"all", all_}});
   object["reasons"] = reasons_;
   object["by_dataset"] = to_json(by_dataset_);
   object["by_family"] = to_json(by_family_);

@@ -225,6 +225,12 @@ TEST_F(Rebuild, AnOutputFolderWhoseNameIsNoUtf8IsBuiltInto) {
   EXPECT_TRUE(build(config(), options, request).was_up_to_date);
 }
 
+TEST_F(Rebuild, AnnotationsWithoutARecordAreTold) {
+  write(scratch_.path() / "data/train.json", R"({"data": []})");
+  EXPECT_THAT([&] { run("out"); },
+              ::testing::ThrowsMessage<std::runtime_error>(HasSubstr("there are no candidates")));
+}
+
 TEST_F(Rebuild, APictureThatIsNotThereIsAFailedSample) {
   fs::remove(scratch_.path() / "data/images/p3.png");
   const BuildSummary summary = run("out");
