@@ -19,6 +19,9 @@ void link_or_copy(const fs::path& from, const fs::path& to) {
     fs::create_hard_link(from, temporary, error);
     if (error) {
       fs::copy_file(from, temporary, fs::copy_options::overwrite_existing);
+      // The copy has the permissions of its source, which nobody may write, but it has to be opened once
+      // more.
+      fs::permissions(temporary, fs::perms::owner_write, fs::perm_options::add);
       commit_file(temporary, to);
     } else {
       fs::rename(temporary, to);  // its bytes were made durable when they were written

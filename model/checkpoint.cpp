@@ -11,6 +11,7 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "manifests/durability.h"
 #include "manifests/json_parse.h"
 
 namespace q3d::model {
@@ -160,7 +161,9 @@ void write_checkpoint(const std::filesystem::path& path, const PrimaConfig& conf
                       const std::map<std::string, std::string>& more_metadata) {
   std::map<std::string, std::string> metadata = more_metadata;
   metadata[kConfigKey] = to_json(config).dump();
-  smal::tensors::write_safetensors(path, tensors, metadata);
+  using smal::tensors::Sync;
+  const Sync sync = manifests::durability().syncs ? Sync::yes : Sync::no;
+  smal::tensors::write_safetensors(path, tensors, metadata, sync);
 }
 
 }  // namespace q3d::model

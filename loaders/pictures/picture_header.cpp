@@ -75,11 +75,16 @@ std::optional<PictureHeader> with_size(PictureHeader header, std::uint32_t width
   return header;
 }
 
+// A picture of a camera has some dozens of markers before its frame. Bytes that fill count too: without a
+// limit, a hostile file of nothing else would keep the program busy for hours.
+constexpr int kMostMarkers = 100'000;
+
 // Goes from marker to marker, up to the frame's own.
 std::optional<PictureHeader> read_jpeg_header(const ReadAt& read_at) {
   PictureHeader header;
   bool has_exif = false;
-  for (std::uint64_t at = 2;;) {
+  std::uint64_t at = 2;
+  for (int step = 0; step < kMostMarkers; ++step) {
     std::array<std::byte, 4> marker{};
     if (!read_at(at, marker) || marker[0] != std::byte{0xff}) return std::nullopt;
     const auto kind = std::to_integer<unsigned>(marker[1]);
@@ -114,6 +119,7 @@ std::optional<PictureHeader> read_jpeg_header(const ReadAt& read_at) {
     }
     at += 2 + length;
   }
+  return std::nullopt;
 }
 
 // Goes from chunk to chunk, up to the pixels.

@@ -15,6 +15,7 @@
 #include "pipeline/build/unit_builder.h"
 #include "pipeline/build/up_to_date.h"
 #include "pipeline/build/workspace.h"
+#include "pipeline/dataset/is_published.h"
 #include "pipeline/network/torch_network.h"
 #include "pipeline/run/log.h"
 
@@ -164,7 +165,7 @@ BuildSummary build(const config::BuildConfig& config, const run::RunOptions& opt
   }
   stages::write_build_plan(options.out, summary.plan);
   summary.notes = workspace.ingest().notes;
-  summary.was_up_to_date = is_published(summary.folder, keys) && !options.rebuild;
+  summary.was_up_to_date = dataset::is_published(summary.folder, keys.dataset) && !options.rebuild;
   workspace.digests().save();
   make_units(rules, request, ranks, workspace, summary);
   ranks.end();

@@ -10,6 +10,7 @@
 #include "pipeline/build/publish.h"
 #include "pipeline/build/quality.h"
 #include "pipeline/build/workspace.h"
+#include "pipeline/dataset/is_published.h"
 #include "pipeline/run/words.h"
 #include "pipeline/stages/build_plan.h"
 #include "pipeline/stages/plan_difference.h"
@@ -119,7 +120,7 @@ DryRun dry_run(const config::BuildConfig& config, const run::RunOptions& options
   result.version = stages::version_name(config.name, plan.keys);
   result.candidates = plan.candidates;
   result.units = static_cast<std::int64_t>(plan.units.size());
-  result.is_up_to_date = is_published(options.out / result.version, plan.keys);
+  result.is_up_to_date = dataset::is_published(options.out / result.version, plan.keys.dataset);
   result.stages = Forecaster(options.out, workspace.ingest(), plan).all();
   return result;
 }

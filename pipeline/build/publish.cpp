@@ -1,7 +1,6 @@
 #include "pipeline/build/publish.h"
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include <optional>
 #include <stdexcept>
@@ -10,7 +9,6 @@
 
 #include "manifests/atomic_file.h"
 #include "manifests/csv_formula.h"
-#include "manifests/digest.h"
 #include "manifests/enumerators.h"
 #include "manifests/file_descriptor.h"
 #include "manifests/link_file.h"
@@ -76,65 +74,11 @@ void warn_of_formulas(std::int64_t cells) {
       cells));
 }
 
-struct ListedFile {
-  fs::path path;
-  std::string expected;              // SHA-256
-  std::optional<std::string> got{};  // of the bytes; nothing if there is no such file
-};
-
-std::optional<std::string> digest_if_present(const fs::path& file) {
-  try {
-    return manifests::sha256_file(file);
-  } catch (const manifests::IoError& error) {
-    if (error.names_no_file()) return std::nullopt;
-    throw;
-  }
-}
-
-// Reads dataset.json. Returns nothing, and warns, if the file is not as it was written.
-std::optional<dataset::DatasetManifest> read_undamaged(const fs::path& folder) {
-  try {
-    return dataset::read_dataset_manifest(folder);
-  } catch (const manifests::DamagedDocument& error) {
-    run::log_warning(fmt::format("damaged: {}; it is published again", error.what()));
-    return std::nullopt;
-  }
-}
-
 }  // namespace
 
 fs::path version_folder(const fs::path& out, const config::BuildConfig& config,
                         const stages::StageKeys& keys) {
   return out / stages::version_name(config.name, keys);
-}
-
-bool is_published(const fs::path& folder, const stages::StageKeys& keys) {
-  if (!fs::exists(folder / "dataset.json")) return false;
-  const std::optional<dataset::DatasetManifest> manifest = read_undamaged(folder);
-  if (!manifest) return false;
-  if (manifest->key != keys.dataset) {
-    throw std::runtime_error(
-        fmt::format("{}: holds a dataset with key {}, expected {}; a finished dataset is never "
-                    "written over. Build into another folder",
-                    folder.string(), manifest->key, keys.dataset));
-  }
-  std::vector<ListedFile> files;
-  for (const dataset::ShardEntry& shard : manifest->shards)
-    files.push_back({folder / shard.file, shard.sha256});
-  files.push_back({folder / "verdicts.csv", manifest->verdicts_sha256});
-  tbb::parallel_for(std::size_t{0}, files.size(), [&](std::size_t i) {
-    if (!run::interrupted()) files[i].got = digest_if_present(files[i].path);
-  });
-  run::throw_if_interrupted();
-  bool is_sound = true;
-  for (const ListedFile& file : files) {
-    if (file.got == file.expected) continue;
-    is_sound = false;
-    run::log_warning(fmt::format("{}: damaged: {}, expected {} by dataset.json; it is published again",
-                                 file.path.string(), file.got ? "got SHA-256 " + *file.got : "it is gone",
-                                 file.expected));
-  }
-  return is_sound;
 }
 
 void publish(const fs::path& folder, const dataset::DatasetInputs& inputs,

@@ -13,12 +13,6 @@ namespace q3d::pipeline::build {
 std::filesystem::path version_folder(const std::filesystem::path& out, const config::BuildConfig& config,
                                      const stages::StageKeys& keys);
 
-// True when the folder holds a complete dataset of this key: dataset.json, and verdicts.csv and every shard
-// with the digests that dataset.json lists. All of them are read, so that no damaged dataset is called up to
-// date. A warning names every file that is gone or damaged. Throws std::runtime_error when the folder holds a
-// dataset of another key, manifests::IoError, and Interrupted.
-bool is_published(const std::filesystem::path& folder, const stages::StageKeys& keys);
-
 // Links the shards into `folder`, where each replaces an older file of its name, writes verdicts.csv and,
 // last, dataset.json. When it returns, all of it has reached the disk. Throws std::runtime_error when the
 // verdicts do not add up to the candidates or a unit has no shard.

@@ -57,6 +57,18 @@ void remove_leftovers(const std::filesystem::path& out) {
 }
 
 // A word that no other run has.
+// Calls a function at the end of a block, however it ends.
+class AtEnd {
+ public:
+  explicit AtEnd(std::function<void()> call) : call_(std::move(call)) {}
+  ~AtEnd() { call_(); }
+  AtEnd(const AtEnd&) = delete;
+  AtEnd& operator=(const AtEnd&) = delete;
+
+ private:
+  std::function<void()> call_;
+};
+
 std::string new_run() {
   std::random_device random;
   return fmt::format("{:08x}{:08x}", random(), random());
@@ -191,6 +203,11 @@ void RankShare::make(unit::UnitFlow flow, device::DeviceWorker& device, const Co
     const std::lock_guard lock(mutex_);
     tell_others_ = std::move(tell_others);
   }
+  // The caller's counters may be gone after this function, also when it ends by an exception.
+  const AtEnd stop_telling([this] {
+    const std::lock_guard lock(mutex_);
+    tell_others_ = nullptr;
+  });
   has_shared_units_ = true;
   flow.units_in_flight = kUnitsInFlight;
   flow.write = [this, &count, write = std::move(flow.write)](unit::UnitWork& work) {
@@ -232,10 +249,6 @@ void RankShare::make(unit::UnitFlow flow, device::DeviceWorker& device, const Co
     } catch (const StoreLost&) {
       is_store_lost_ = true;
     }
-  }
-  {
-    const std::lock_guard lock(mutex_);
-    tell_others_ = nullptr;
   }
   if (is_store_lost_ && !leads()) {
     throw LeaderLost(fmt::format(

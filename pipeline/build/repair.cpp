@@ -131,16 +131,18 @@ RepairSummary repair(const fs::path& given, const std::optional<config::BuildCon
   RepairSummary summary;
   summary.folder = fs::canonical(dataset::dataset_folder(given));
   const fs::path out = summary.folder.parent_path();
-  const Findings before = find_problems(summary.folder, options.quiet);
-  summary.problems = before.problems;
-  if (before.problems.empty()) return summary;
+  Findings before;
   std::optional<std::string> document;
-  if (before.has_manifest) {
-    if (config) require_same_config(summary.folder, *config);
-    document = manifests::read_file(summary.folder / "dataset.json");
-  }
   {
+    // A build that works meanwhile would have files that are not in its journal yet, which look damaged.
     const manifests::FolderLock lock(out);
+    before = find_problems(summary.folder, options.quiet);
+    summary.problems = before.problems;
+    if (before.problems.empty()) return summary;
+    if (before.has_manifest) {
+      if (config) require_same_config(summary.folder, *config);
+      document = manifests::read_file(summary.folder / "dataset.json");
+    }
     for (const Damage& each : before.damage) {
       const bool is_journal = each.file.filename() == "journal.jsonl";
       if (const auto place = is_journal ? quarantine_copy(out, each.file) : quarantine(out, each.file)) {

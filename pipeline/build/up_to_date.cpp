@@ -15,6 +15,7 @@
 #include "manifests/block_reader.h"
 #include "manifests/digest.h"
 #include "manifests/file_descriptor.h"
+#include "manifests/file_stamp.h"
 #include "pipeline/build/file_stamps.h"
 #include "pipeline/stages/build_plan.h"
 #include "pipeline/stages/stages.h"
@@ -75,11 +76,14 @@ void add(PathTable& paths, const fs::path& path) {
   if (!path.empty()) paths.add(fs::absolute(path).string());
 }
 
-// The files that make the program: it and its libraries of this project.
-void add_program(PathTable& paths) {
+// The file of the program, whose stamp stands for its code. Returns false if it is no longer there: the
+// program was replaced while it ran, and its file's stamp can never be compared.
+bool add_program(PathTable& paths) {
   std::error_code error;
   const fs::path program = fs::read_symlink("/proc/self/exe", error);
-  if (!error) paths.add(program.string());
+  if (error || !manifests::stamp_of(program)) return false;
+  paths.add(program.string());
+  return true;
 }
 
 // Changes of these bring pictures to light or hide them.
@@ -250,7 +254,7 @@ std::optional<PathTable> UpToDateRecord::inputs(const candidates::Ingest& ingest
       add(paths, file);
     }
   }
-  add_program(paths);
+  if (!add_program(paths)) return std::nullopt;
   return paths;
 }
 

@@ -68,6 +68,13 @@ class Verifier {
     summary_.damage.push_back({file, expected});
   }
 
+  // A file that is gone or too short is damaged. Any other error of the system (EACCES, EIO, ...) says
+  // nothing of the file's content, and --repair must not move a sound file away: it ends the verification.
+  static void require_damage(const manifests::IoError& error) {
+    const bool is_too_short = error.code() == 0;
+    if (!error.names_no_file() && !is_too_short) throw error;
+  }
+
   void check_shard(const ShardEntry& entry) {
     ++summary_.shards;
     const fs::path path = dataset_.shard_file(entry);
@@ -89,6 +96,7 @@ class Verifier {
       }
       check_samples(entry, shard);
     } catch (const manifests::IoError& error) {
+      require_damage(error);
       damage(path, entry.sha256, error.what());
     } catch (const std::runtime_error& error) {
       problem(error.what());
@@ -195,6 +203,7 @@ class Verifier {
                "verdicts.csv: its SHA-256 is not the one in dataset.json");
       }
     } catch (const manifests::IoError& error) {
+      require_damage(error);
       damage(dataset_.verdicts_file(), manifest.verdicts_sha256, error.what());
     }
     const Counts& counts = manifest.counts;

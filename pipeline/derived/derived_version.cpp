@@ -13,6 +13,7 @@
 #include "manifests/link_file.h"
 #include "manifests/sealed_json.h"
 #include "manifests/trust.h"
+#include "pipeline/dataset/is_published.h"
 #include "pipeline/derived/derived_manifest.h"
 #include "pipeline/run/errors.h"
 #include "pipeline/run/interrupt.h"
@@ -138,7 +139,7 @@ DerivedVersion write_derived(const fs::path& out, const std::string& name, const
     for (const VerdictRow& row : selection.rows) result.counts.add(row.judgement.verdict);
   }
   ordered_json document = derived_manifest(selections, how);  // before anything is written: it may refuse
-  result.was_up_to_date = fs::exists(result.folder / "dataset.json");
+  result.was_up_to_date = dataset::is_published(result.folder, key);
   if (result.was_up_to_date) return result;
   ShardWriter writer(result.folder, result);
   writer.write(selections);

@@ -249,6 +249,11 @@ TrainingPools held_out_pools(const TrainingConfig& config, const TrainingPools& 
   return pools;
 }
 
+std::vector<std::string> joined(std::vector<std::string> first, const std::vector<std::string>& second) {
+  first.insert(first.end(), second.begin(), second.end());
+  return first;
+}
+
 class Run {
  public:
   Run(const TrainingConfig& config, const TrainingOptions& options)
@@ -262,6 +267,7 @@ class Run {
         priors_(model::load_priors(smal::tensors::SafeTensors::open(config.network.priors), device_.device)),
         pools_(pools_of(config.phases), options.skip_damaged),
         held_out_(held_out_pools(config, pools_, options.skip_damaged)),
+        left_out_(joined(pools_.left_out(), held_out_.left_out())),
         key_(run_key(config, pools_.identity())),
         stored_(load_state(state_path(), key_)) {
     if (stored_) position_ = stored_->position;
@@ -290,7 +296,7 @@ class Run {
   TrainingSummary run() {
     TrainingSummary summary;
     summary.rank = ranks_->rank();
-    summary.left_out = pools_.left_out();
+    summary.left_out = left_out_;
     for (const PhaseConfig& phase : config_.phases) summary.steps_total += phase.steps;
     std::optional<TrainingLog> log;
     if (leads()) log.emplace(options_.out / "log.jsonl", position_.phase, position_.step);
@@ -312,7 +318,7 @@ class Run {
  private:
   void tell_left_out() const {
     constexpr std::size_t kShown = 20;
-    const std::vector<std::string>& lines = pools_.left_out();
+    const std::vector<std::string>& lines = left_out_;
     for (std::size_t i = 0; i < std::min(kShown, lines.size()); ++i)
       run::log_warning("left out: " + lines[i]);
     if (lines.size() > kShown) {
@@ -473,7 +479,8 @@ class Run {
   smal::tensors::SmalAsset asset_;
   model::Priors priors_;
   TrainingPools pools_;
-  TrainingPools held_out_;  // has no pool if the config names none
+  TrainingPools held_out_;             // has no pool if the config names none
+  std::vector<std::string> left_out_;  // of all pools
   std::string key_;
   std::optional<StoredState> stored_;
   TrainingPosition position_;

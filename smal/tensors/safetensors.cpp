@@ -203,7 +203,17 @@ void write_all(int fd, const void* data, std::size_t bytes) {
 }
 
 // The steps of manifests/atomic_file.h, which this room does not see: it links no other room than smal.
-void write_file(const std::filesystem::path& path, const NamedTensors& tensors, const std::string& header) {
+void sync_file(int fd) {
+  while (::fsync(fd) != 0) {
+    if (errno != EINTR) {
+      throw std::runtime_error("cannot make it durable: " + system_reason() +
+                               "; if the disk cannot do this, give --no-sync");
+    }
+  }
+}
+
+void write_file(const std::filesystem::path& path, const NamedTensors& tensors, const std::string& header,
+                Sync sync) {
   constexpr std::string_view kEnding = ".tmp";  // as manifests::remove_temporaries knows it
   std::string temporary = path.string() + ".XXXXXX" + std::string(kEnding);
   FileDescriptor file(::mkstemps(temporary.data(), static_cast<int>(kEnding.size())));
@@ -214,7 +224,8 @@ void write_file(const std::filesystem::path& path, const NamedTensors& tensors, 
     write_all(file.get(), &header_bytes, kLengthBytes);
     write_all(file.get(), header.data(), header.size());
     for (const auto& [name, tensor] : tensors) write_all(file.get(), tensor.data_ptr(), tensor.nbytes());
-    if (::fchmod(file.get(), 0644) != 0 || ::fsync(file.get()) != 0 || file.close() != 0) {
+    if (sync == Sync::yes) sync_file(file.get());
+    if (::fchmod(file.get(), 0644) != 0 || file.close() != 0) {
       throw std::runtime_error("cannot finish: " + system_reason());
     }
     if (::rename(temporary.c_str(), path.c_str()) != 0) {
@@ -230,23 +241,22 @@ void write_file(const std::filesystem::path& path, const NamedTensors& tensors, 
 void sync_folder(const std::filesystem::path& path) {
   const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
   const FileDescriptor handle(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (handle.get() < 0 || ::fsync(handle.get()) != 0) {
-    throw std::runtime_error("cannot sync its folder: " + system_reason());
-  }
+  if (handle.get() < 0) throw std::runtime_error("cannot open its folder: " + system_reason());
+  sync_file(handle.get());
 }
 
 }  // namespace
 
 void write_safetensors(const std::filesystem::path& path, const NamedTensors& tensors,
-                       const std::map<std::string, std::string>& metadata) {
+                       const std::map<std::string, std::string>& metadata, Sync sync) {
   try {
     NamedTensors plain;
     for (const auto& [name, tensor] : tensors) {
       if (!tensor.defined()) throw std::runtime_error("tensor " + quote_name(name) + " is undefined");
       plain.emplace_back(name, tensor.detach().to(torch::kCPU).contiguous());
     }
-    write_file(path, plain, header_text(plain, metadata));
-    sync_folder(path);
+    write_file(path, plain, header_text(plain, metadata), sync);
+    if (sync == Sync::yes) sync_folder(path);
   } catch (const std::exception& error) {
     throw std::runtime_error(path.string() + ": cannot write the safetensors file: " + error.what());
   }

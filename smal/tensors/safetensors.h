@@ -34,9 +34,11 @@ class SafeTensors {
 
 using NamedTensors = std::vector<std::pair<std::string, torch::Tensor>>;
 
+enum class Sync { yes, no };  // whether a file is made durable; some network disks cannot do it
+
 // Writes under a temporary name, fsyncs and renames. Tensors are written contiguous, in the given order.
 // Throws std::runtime_error naming the path and the system's reason.
 void write_safetensors(const std::filesystem::path& path, const NamedTensors& tensors,
-                       const std::map<std::string, std::string>& metadata = {});
+                       const std::map<std::string, std::string>& metadata = {}, Sync sync = Sync::yes);
 
 }  // namespace q3d::smal::tensors

@@ -92,6 +92,16 @@ TEST(PictureHeader, a_damaged_block_has_no_orientation) {
 }
 
 // Cut anywhere or with any byte changed, a header is read or refused, and never beyond the end.
+// A file of nothing but bytes that fill would be gone through one by one.
+TEST(PictureHeader, the_way_to_the_frame_is_bounded) {
+  const std::string jpeg = file_content("rgb.jpg");
+  const auto filled = [&](std::size_t count) {
+    return as_bytes(jpeg.substr(0, 2) + std::string(count, '\xff') + jpeg.substr(2));
+  };
+  EXPECT_TRUE(read_picture_header(filled(1000)));
+  EXPECT_FALSE(read_picture_header(filled(1'000'000)));
+}
+
 TEST(PictureHeader, damaged_files_are_refused) {
   for (const char* name : {"exif_turned.jpg", "palette.png"}) {
     const std::string whole = file_content(name);

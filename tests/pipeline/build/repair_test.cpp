@@ -3,9 +3,12 @@
 
 #include <gmock/gmock.h>
 
+#include "manifests/file_descriptor.h"
+#include "manifests/lock.h"
 #include "pipeline/dataset/verify.h"
 #include "pipeline/run/errors.h"
 #include "tests/pipeline/build/rebuild_fixture.h"
+#include "tests/support/failing_io.h"
 
 namespace q3d::pipeline::build {
 namespace {
@@ -49,6 +52,23 @@ TEST_F(Repair, ASoundDatasetIsLeftAsItIs) {
   const RepairSummary summary = mend();
   EXPECT_THAT(summary.problems, IsEmpty());
   EXPECT_FALSE(summary.was_built);
+  EXPECT_FALSE(fs::exists(out_ / "quarantine"));
+}
+
+// What the disk does not give now may be sound.
+TEST_F(Repair, AFileThatCannotBeReadIsNotMovedAway) {
+  for (const char* file : {"/shards/000001.h5", "/verdicts.csv"}) {
+    const testing::FailingIo io(testing::Call::open, file, EACCES);
+    EXPECT_THROW(mend(), manifests::IoError);
+  }
+  EXPECT_FALSE(fs::exists(out_ / "quarantine"));
+  expect_as_before();
+}
+
+TEST_F(Repair, ABuildThatWorksMeanwhileIsNotDisturbed) {
+  flip_bit(first_.folder / "shards/000001.h5", 3000);
+  const manifests::FolderLock working(out_);
+  EXPECT_THROW(mend(), std::runtime_error);
   EXPECT_FALSE(fs::exists(out_ / "quarantine"));
 }
 

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "manifests/atomic_file.h"
+#include "pipeline/dataset/published_dataset.h"
 #include "pipeline/dataset/verify.h"
 #include "pipeline/derived/difference.h"
 #include "pipeline/derived/operations.h"
@@ -71,6 +72,21 @@ TEST_F(Derived, MergeHasAllCandidatesOnceAndTellsDuplicates) {
   EXPECT_EQ(from[1].at("content_id"), wolves_.document.at("content_id"));
   EXPECT_EQ(from[1].at("provenance"), wolves_.document.at("provenance"));
   EXPECT_TRUE(merge({dogs_.folder, wolves_.folder}, out(), "", "1.0.0").version.was_up_to_date);
+}
+
+TEST_F(Derived, ADamagedVersionIsWrittenAgain) {
+  const DerivedVersion first = merge({dogs_.folder, wolves_.folder}, out(), "", "1.0.0");
+  EXPECT_TRUE(merge({dogs_.folder, wolves_.folder}, out(), "", "1.0.0").was_up_to_date);
+  const dataset::PublishedDataset made(first.folder);
+  const std::string document = manifests::read_file(first.folder / "dataset.json");
+  for (const fs::path& damaged : {made.shard_file(made.manifest().shards.front()), made.verdicts_file()}) {
+    fs::remove(damaged);
+    EXPECT_FALSE(merge({dogs_.folder, wolves_.folder}, out(), "", "1.0.0").was_up_to_date);
+    expect_sound(first.folder, first.counts.retained + first.counts.refined);
+  }
+  manifests::write_file_atomically(first.folder / "dataset.json", document + " ");
+  EXPECT_FALSE(merge({dogs_.folder, wolves_.folder}, out(), "", "1.0.0").was_up_to_date);
+  EXPECT_EQ(manifests::read_file(first.folder / "dataset.json"), document);
 }
 
 TEST_F(Derived, VersionsThatDoNotFitAreRefused) {

@@ -296,6 +296,19 @@ TEST_F(TrainingRun, AbsurdBoxesAreRefusedOrLeftOutAndNamed) {
   EXPECT_EQ(manifests::read_file(skipped.model), manifests::read_file(run("sound").model));
 }
 
+TEST_F(TrainingRun, WhatIsLeftOutOfTheHeldOutPoolIsNamedToo) {
+  std::vector<manifests::ShardSample> samples;
+  for (unsigned i = 0; i < 3; ++i)
+    samples.push_back(testing::shard_sample("unseen/" + std::to_string(i), i, true));
+  samples[1].patch_box[2] = 0.0;
+  manifests::ShardHeader header;
+  header.image_encoding = manifests::ImageEncoding::png;
+  manifests::write_shard(path("unseen.h5"), header, samples);
+  config_.domain = {"rendered", "two shards", "unseen", {"unseen", {path("unseen.h5").string()}, 1.0}, 21};
+  EXPECT_THAT(message([&] { run("out"); }), HasSubstr("unseen/1: its box"));
+  EXPECT_THAT(run_without_damage("skipped").left_out, ::testing::ElementsAre(HasSubstr("unseen/1: its box")));
+}
+
 TEST_F(TrainingRun, ADamagedStateIsRefused) {
   run("out", 2);
   const std::string sound = manifests::read_file(path("out/state.safetensors"));
