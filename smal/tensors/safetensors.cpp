@@ -29,8 +29,8 @@ std::string system_reason() {
   return std::strerror(errno);
 }
 
-// A pickle starts with 0x80 and its protocol, 2 to 5. So may the length of a header, which then starts with a
-// brace.
+// A pickle starts with 0x80 and its protocol, 2 to 5. The length of a safetensors header may start with the
+// same bytes, but a brace follows it.
 bool is_pickle(std::string_view content) {
   const bool has_header = content.size() > kLengthBytes && content[kLengthBytes] == '{';
   return content.size() >= 2 && content[0] == '\x80' && content[1] >= 2 && content[1] <= 5 && !has_header;
@@ -80,7 +80,7 @@ struct SafeTensors::Mapping {
   }
 
   void map_file() {
-    // O_NONBLOCK: opening a named pipe would otherwise wait for a writer.
+    // O_NONBLOCK is set because opening a named pipe would otherwise wait for a writer.
     const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
     if (file.get() < 0) throw std::runtime_error("cannot open: " + system_reason());
     struct stat status {};
@@ -202,9 +202,9 @@ void write_all(int fd, const void* data, std::size_t bytes) {
   }
 }
 
-// The steps of manifests/atomic_file.h, which this room does not see: it links no other room than smal.
+// This repeats the steps of manifests/atomic_file.h, because this folder depends on nothing but smal.
 void write_file(const std::filesystem::path& path, const NamedTensors& tensors, const std::string& header) {
-  constexpr std::string_view kEnding = ".tmp";  // as manifests::remove_temporaries knows it
+  constexpr std::string_view kEnding = ".tmp";  // the suffix that manifests::remove_temporaries removes
   std::string temporary = path.string() + ".XXXXXX" + std::string(kEnding);
   FileDescriptor file(::mkstemps(temporary.data(), static_cast<int>(kEnding.size())));
   if (file.get() < 0)
