@@ -9,23 +9,23 @@
 
 namespace q3d::pipeline::build {
 
-// <out>/<name>-<first 12 hex of the dataset key>.
+// Returns <out>/<name>-<first 12 hex digits of the dataset key>.
 std::filesystem::path version_folder(const std::filesystem::path& out, const config::BuildConfig& config,
                                      const stages::StageKeys& keys);
 
-// True when the folder holds a complete dataset of this key: dataset.json, and verdicts.csv and every shard
-// with the digests that dataset.json lists. All of them are read, so that no damaged dataset is called up to
-// date. A warning names every file that is gone or damaged. Throws std::runtime_error when the folder holds a
-// dataset of another key, manifests::IoError, and Interrupted.
+// Returns whether the folder holds a complete dataset of this key: dataset.json, and verdicts.csv and every
+// shard with the digests that dataset.json lists. All of them are read, so that no damaged dataset is called
+// up to date. A warning names every file that is gone or damaged. Throws std::runtime_error if the folder
+// holds a dataset of another key, manifests::IoError, and Interrupted.
 bool is_published(const std::filesystem::path& folder, const stages::StageKeys& keys);
 
-// Links the shards into `folder`, where each replaces an older file of its name, writes verdicts.csv and,
-// last, dataset.json. When it returns, all of it has reached the disk. Throws std::runtime_error when the
-// verdicts do not add up to the candidates or a unit has no shard.
+// Links the shards into `folder`, where each replaces an older file of its name, and writes verdicts.csv and,
+// last, dataset.json. When it returns, everything has reached the disk. Throws std::runtime_error if the
+// number of verdicts differs from that of the candidates or a unit has no shard.
 void publish(const std::filesystem::path& folder, const dataset::DatasetInputs& inputs,
              const dataset::JudgementList& judgements, stages::StageStore& shards);
 
-// Makes <out>/latest a link to the version's folder, in one step, and durable.
+// Makes <out>/latest a link to the version's folder, in one step and durably.
 void point_latest(const std::filesystem::path& out, const std::filesystem::path& folder);
 
 }  // namespace q3d::pipeline::build

@@ -30,8 +30,8 @@ using nlohmann::json;
 constexpr int kForm = 2;  // of the record
 constexpr std::size_t kFilesAtOnce = 16'384;
 constexpr std::size_t kMostEntries = 20'000'000;
-// Stamps of one tick of the file system's clock do not tell two writes apart. Linux ticks every 10 ms or
-// faster; a time in whole seconds comes from a file system that has no finer ones.
+// Two writes within one tick of the file system's clock have the same stamp. Linux ticks every 10 ms or
+// faster; a time in whole seconds comes from a file system without finer times.
 constexpr std::int64_t kTickNs = 50'000'000;
 constexpr std::int64_t kCoarseTickNs = 2'000'000'000;
 
@@ -45,8 +45,9 @@ std::int64_t tick_of(std::int64_t time_ns) {
   return time_ns % manifests::kNsPerSecond == 0 ? kCoarseTickNs : kTickNs;
 }
 
-// A digest of what the user asks for, and of the output folder's place: in a copy of the folder, the record
-// would speak of the files of the other one. The program's own stamp stands for its code.
+// Returns a digest of the user's request and of the output folder's path. The path is included because, in a
+// copy of the folder, the record would describe the files of the original. The program's own stamp stands for
+// its code.
 std::string request_digest(const fs::path& out, const config::BuildConfig& config,
                            const config::JudgingRules& rules, const std::string& device_key) {
   json datasets = json::array();
@@ -67,14 +68,14 @@ void add(PathTable& paths, const fs::path& path) {
   if (!path.empty()) paths.add(fs::absolute(path).string());
 }
 
-// The files that make the program: it and its libraries of this project.
+// Adds the program's files: its executable and its libraries from this project.
 void add_program(PathTable& paths) {
   std::error_code error;
   const fs::path program = fs::read_symlink("/proc/self/exe", error);
   if (!error) paths.add(program.string());
 }
 
-// Changes of these bring pictures to light or hide them.
+// Adds folders in which a picture could appear or disappear.
 bool add_folders(PathTable& paths, const fs::path& folder, const fs::path& except) {
   if (folder.empty()) return true;
   const auto found = folders_below(fs::absolute(folder).lexically_normal(), except, kMostEntries);
@@ -86,18 +87,18 @@ bool add_folders(PathTable& paths, const fs::path& folder, const fs::path& excep
 std::vector<std::string> published_files(const fs::path& folder) {
   std::vector<std::string> paths{(folder / "dataset.json").string(), (folder / "verdicts.csv").string()};
   for (const auto& entry : fs::directory_iterator(folder / "shards")) paths.push_back(entry.path().string());
-  paths.push_back((folder / "shards").string());  // tells of files that are added or removed
+  paths.push_back((folder / "shards").string());  // its stamp changes if files are added or removed
   return paths;
 }
 
-// Waits until a further write would get a later stamp.
+// Waits until another write would get a later stamp.
 void let_clock_tick(const std::vector<StampedFile>& files) {
   const std::int64_t newest = newest_change_ns(files);
   const std::int64_t wait = newest + tick_of(newest) - now_ns();
   if (wait > 0 && wait <= kCoarseTickNs) std::this_thread::sleep_for(std::chrono::nanoseconds(wait));
 }
 
-// The text of a record, which ends with a line that has the digest of all before it.
+// Writes the text of a record. Its last line holds the digest of everything before it.
 class RecordWriter {
  public:
   explicit RecordWriter(const fs::path& file) : file_(file) {}
@@ -106,7 +107,7 @@ class RecordWriter {
     digest_.update(std::as_bytes(std::span(text)));
     file_.write(text);
   }
-  // Returns false if a path fits no line.
+  // Returns false if a path cannot be written as a line.
   bool write(std::span<const StampedFile> files) {
     std::string text;
     const bool fits = stamps_.append(files, text);
@@ -124,7 +125,7 @@ class RecordWriter {
   StampWriter stamps_;
 };
 
-// Gives the lines of a record but the last.
+// Reads the lines of a record except the last.
 class RecordReader {
  public:
   explicit RecordReader(const fs::path& file) : lines_(file) { advance(); }
@@ -142,7 +143,7 @@ class RecordReader {
     line.pop_back();
     return line;
   }
-  // Once all lines were given: whether the last has the digest of the others.
+  // Returns, after all lines were read, whether the last line has the digest of the others.
   bool is_sound() { return lines_.was_whole() && last_ == digest_.hex(); }
 
  private:
@@ -157,7 +158,7 @@ class RecordReader {
   manifests::Sha256 digest_;
 };
 
-// Whether every file of the record's remaining lines has its stamp.
+// Returns whether every file of the record's remaining lines has its stamp.
 bool has_all_stamps(RecordReader& record) {
   StampReader stamps;
   std::vector<StampedFile> files;
@@ -172,7 +173,7 @@ bool has_all_stamps(RecordReader& record) {
   return true;
 }
 
-// The result that a record's head states. Throws json::exception for anything else.
+// Returns the result that a record's head states. Throws json::exception for any other text.
 UpToDateRecord::Unchanged result_in(const std::string& head, const fs::path& out) {
   const json said = json::parse(head);
   UpToDateRecord::Unchanged found{out / said.at("folder").get<std::string>(),
@@ -228,7 +229,7 @@ std::optional<PathTable> UpToDateRecord::inputs(const candidates::Ingest& ingest
   for (const config::DatasetConfig& dataset : config_.datasets) {
     for (const fs::path& file :
          {dataset.annotations, dataset.topology, dataset.curation, dataset.body_model}) {
-      if (!file.empty()) add(paths, dataset.root / file);  // an absolute path stays as it is
+      if (!file.empty()) add(paths, dataset.root / file);  // an absolute path is unchanged
     }
     for (const fs::path& world : {dataset.root, dataset.root.parent_path()}) add(paths, world / "world.json");
     if (!add_folders(paths, dataset.root, except)) return std::nullopt;
@@ -269,7 +270,7 @@ void UpToDateRecord::keep(const candidates::Ingest& ingest, const fs::path& fold
     newest = std::max(newest, newest_change_ns(files));
     if (!record.write(files)) return;
   }
-  if (newest + tick_of(newest) > begun_ns_) return;  // a later build leaves the record
+  if (newest + tick_of(newest) > begun_ns_) return;  // a later build will write the record
   const std::vector<StampedFile> published = stamp_files(published_files(folder));
   let_clock_tick(published);
   if (!have_stamps(published) || !record.write(published)) return;
