@@ -52,7 +52,7 @@ class ShardWriter {
  public:
   ShardWriter(const fs::path& folder, DerivedVersion& result) : folder_(folder), result_(result) {
     fs::create_directories(folder_ / "shards");
-    manifests::remove_temporaries(folder_);  // what a run that was killed left
+    manifests::remove_temporaries(folder_);  // of a killed run
     manifests::remove_temporaries(folder_ / "shards");
   }
 
@@ -137,7 +137,7 @@ DerivedVersion write_derived(const fs::path& out, const std::string& name, const
   for (const Selection& selection : selections) {
     for (const VerdictRow& row : selection.rows) result.counts.add(row.judgement.verdict);
   }
-  ordered_json document = derived_manifest(selections, how);  // before anything is written: it may refuse
+  ordered_json document = derived_manifest(selections, how);  // before anything is written: it may throw
   result.was_up_to_date = fs::exists(result.folder / "dataset.json");
   if (result.was_up_to_date) return result;
   ShardWriter writer(result.folder, result);
