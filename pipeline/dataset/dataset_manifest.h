@@ -62,7 +62,7 @@ struct DatasetManifest {
   int schema = 0;
   Counts counts;
   std::map<manifests::LabelKind, std::int64_t> labels;  // number of kept samples by kind of label
-  std::map<manifests::Reason, std::int64_t> reasons;    // reasons of the discarded and the failed
+  std::map<manifests::Reason, std::int64_t> reasons;    // number of discarded and failed ones by reason
   GroupStatistics all;
   std::map<std::string, GroupStatistics> by_dataset;  // by "name/split"
   std::map<manifests::Family, GroupStatistics> by_family;

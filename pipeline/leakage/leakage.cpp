@@ -71,8 +71,7 @@ Pictures read_test_sets(const config::LeakageConfig& config, manifests::DigestCa
     std::vector<std::string> shas(dataset.records.size());
     tbb::parallel_for(std::size_t{0}, shas.size(), [&](std::size_t i) {
       if (dataset.records[i].image_path.empty() || run::interrupted()) return;
-      shas[i] =
-          digests.digest_if_present(dataset.records[i].image_path).value_or("");  // reported below if missing
+      shas[i] = digests.digest_if_present(dataset.records[i].image_path).value_or("");  // "": reported below
     });
     run::throw_if_interrupted();
     for (std::size_t i = 0; i < shas.size(); ++i) {
