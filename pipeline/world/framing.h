@@ -3,7 +3,7 @@
 //
 // The network's crop camera has focal 1000 px for a crop scaled to 256 px and its principal point in the
 // crop's centre. A picture is therefore rendered with this camera, expressed in its own pixels: focal 1000
-// * side / 256 px, principal point in the (floored) centre of the annotated box. It is like a part of a //
+// * side / 256 px, principal point in the (floored) centre of the annotated box. It is like a part of a
 // larger sensor's picture, and the translation is exact.
 #pragma once
 
