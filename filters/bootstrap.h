@@ -35,9 +35,9 @@ BootstrapInterval paired_bootstrap(std::span<const double> differences,
                                    std::span<const std::size_t> picture_of_item,
                                    const BootstrapOptions& options);
 
-// The same for two methods that choose their items, such as the labels that two builds keep. The result is
-// the mean of the second set minus that of the first. first, second: runs x items, row-major; the item's
-// value under each method, NaN if it is not in the set.
+// Computes the same interval for two methods that choose their items, such as the labels that two builds
+// keep. The result is the mean of the second set minus that of the first. first, second: runs x items,
+// row-major; the item's value under each method, NaN if it is not in the set.
 //
 // Pictures and runs are drawn as above, the same for both sets. A resample's difference is that of the two
 // means over all drawn members, so a picture that is easy for both methods does not widen the interval. The

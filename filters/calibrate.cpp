@@ -60,7 +60,7 @@ Calibration calibrate(std::span<const CalibrationSample> pool, const TargetShare
   std::sort(sorted.begin(), sorted.end(),
             [](const auto& a, const auto& b) { return a.initial_error < b.initial_error; });
   const auto count = static_cast<double>(sorted.size());
-  std::vector<double> passing(sorted.size() + 1);  // of the first i
+  std::vector<double> passing(sorted.size() + 1);  // [i]: number of the first i samples that pass adaptation
   for (std::size_t i = 0; i < sorted.size(); ++i)
     passing[i + 1] = passing[i] + (sorted[i].passes_adaptation ? 1 : 0);
 

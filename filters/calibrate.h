@@ -7,7 +7,7 @@
 
 namespace q3d::filters {
 
-struct TargetShares {  // shares of all judged candidates; the paper: 5 of 14, 4 of 14, 5 of 14
+struct TargetShares {  // shares of all judged candidates; the paper's are 5/14, 4/14 and 5/14
   double retained = 5.0 / 14.0;
   double refined = 4.0 / 14.0;
 };

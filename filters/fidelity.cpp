@@ -62,7 +62,7 @@ Judgement describe(std::span<const double> curve, std::size_t kept, const Thresh
   return judgement;
 }
 
-// Returns whether adaptation ended below stop_below before the gain could be asked for.
+// Returns whether adaptation ended below stop_below before the window of the gain was full.
 bool ended_early(std::span<const double> curve, const Thresholds& thresholds) {
   return curve.size() <= static_cast<std::size_t>(thresholds.gain_window) + 1 &&
          curve.back() < thresholds.stop_below;

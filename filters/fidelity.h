@@ -53,11 +53,12 @@ manifests::Judgement judge_initial(double initial_error, const Thresholds& thres
 // a failure (prediction_not_finite).
 manifests::Judgement judge_adapted(std::span<const double> curve, const Thresholds& thresholds);
 
-// The same for a sample of which adaptation did not see all keypoints. `held_out` is the error of the hidden
-// keypoints; `curve` is the error of all visible keypoints, for the same iterates. The kept iterate is the
-// first with the least held-out error. This asks for more than the paper's rule: the kept iterate must not be
-// the prediction itself (held_out_not_better), because an adaptation that does not improve unseen points has
-// not found a better body. Throws std::invalid_argument if the lengths differ.
+// Returns the verdict on a sample of the middle band of which adaptation did not see all keypoints.
+// `held_out` is the error of the hidden keypoints; `curve` is the error of all visible keypoints, for the
+// same iterates. The kept iterate is the first with the least held-out error. This asks for more than the
+// paper's rule: the kept iterate must not be the prediction itself (held_out_not_better), because an
+// adaptation that does not improve unseen points has not found a better body. Throws std::invalid_argument if
+// the lengths differ.
 manifests::Judgement judge_held_out(std::span<const double> curve, std::span<const double> held_out,
                                     const Thresholds& thresholds);
 

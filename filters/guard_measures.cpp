@@ -164,7 +164,7 @@ double left_right_ratio(const smal::CropPoints& projected, const smal::CropKeypo
     exchanged += std::abs(double{projected[k].y} - annotated[other].y);
   }
   if (!has_pair) return std::numeric_limits<double>::quiet_NaN();
-  if (as_annotated == exchanged) return 1.0;  // 0 / 0 too: the sides coincide
+  if (as_annotated == exchanged) return 1.0;  // also 0 / 0: the sides coincide
   return as_annotated / exchanged;
 }
 

@@ -1,4 +1,4 @@
-// The numbers that the guards' bounds apply to. Pure functions of bodies, keypoints and masks.
+// Computes the numbers that the guards' bounds apply to, as pure functions of bodies, keypoints and masks.
 #pragma once
 
 #include <array>
@@ -10,7 +10,7 @@
 
 namespace q3d::filters {
 
-// Official code: PosePriorLoss. Row-major.
+// The prior of the poses. Matrices are row-major. Official code: PosePriorLoss.
 struct PosePrior {
   std::vector<double> mean;   // 105 rad: axis-angle of 35 joints, the global orientation first
   std::vector<double> precs;  // 105 x 105: deviation @ precs has unit variance
@@ -22,7 +22,7 @@ struct PosePrior {
 // std::invalid_argument for wrong counts and for a prior that uses no number.
 double pose_deviation(std::span<const float> rotations, const PosePrior& prior);
 
-// Official code: ShapePriorLoss. One entry a family.
+// The prior of the shapes, with one entry for each family. Official code: ShapePriorLoss.
 struct ShapePrior {
   struct Family {
     std::vector<double> mean;   // 41 betas

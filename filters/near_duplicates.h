@@ -17,8 +17,8 @@ inline constexpr int kMaxHashDistance = 15;  // the largest distance that HashIn
 // Finds 64-bit hashes within a Hamming distance d, exactly, by multi-index hashing (Norouzi, Punjani, Fleet:
 // "Fast Search in Hamming Space with Multi-Index Hashing", 2012). Of four bands of 16 bits, one must differ
 // in at most d / 4 bits. Therefore each band is searched only for the values near its own. The index takes 48
-// bytes for each hash plus 1 MB. Every band keeps the hashes in its own order, so that a search reads few
-// runs of memory instead of a thousand places.
+// bytes for each hash plus 1 MB. Every band keeps the hashes in its own order, so that a search reads a few
+// contiguous runs of memory instead of a thousand scattered places.
 class HashIndex {
  public:
   // Throws std::invalid_argument unless 0 <= max_distance <= kMaxHashDistance and there are fewer than 2^32
@@ -26,7 +26,7 @@ class HashIndex {
   HashIndex(std::span<const std::uint64_t> hashes, int max_distance);
 
   struct Match {
-    std::uint32_t position = 0;  // of the hash, as given to the constructor
+    std::uint32_t position = 0;  // index of the hash in the list that the constructor was given
     int distance = 0;
   };
   // Returns all hashes within max_distance, each once, in no particular order.

@@ -17,7 +17,7 @@ struct Term {
   double (*value)(const Judgement&);
   double mean;
   double deviation;
-  double weight;  // of the log odds of a good label
+  double weight;  // weight of the term in the log odds of a good label
 };
 
 // Ratios and distances have long tails, which their logarithms do not have.

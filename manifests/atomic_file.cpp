@@ -32,8 +32,8 @@ class RemoveOnFailure {
   bool armed_ = true;
 };
 
-// Makes a complete temporary file durable under its name. After the rename there is no temporary file left to
-// remove, and a guard that removes it does no harm.
+// Syncs and closes a complete temporary file and renames it to `path`. If syncing the folder then fails, a
+// guard may still try to remove the temporary file; it no longer exists, so this does no harm.
 void finish(FileDescriptor& file, const fs::path& temporary, const fs::path& path) {
   file.sync();
   file.close();

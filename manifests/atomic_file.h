@@ -22,7 +22,8 @@ std::filesystem::path temporary_name(const std::filesystem::path& path);
 void write_file_atomically(const std::filesystem::path& path, std::span<const std::byte> content);
 void write_file_atomically(const std::filesystem::path& path, std::string_view content);
 
-// The same for a file that is too long to lie in memory: its text comes in pieces.
+// Writes a file like write_file_atomically(), but takes its text in pieces, for files that are too long to
+// lie in memory.
 class AtomicWriter {
  public:
   // Makes the temporary file. Throws IoError, as all members do.

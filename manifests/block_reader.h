@@ -19,10 +19,10 @@ class BlockReader {
   // Opens a regular file. Throws IoError.
   explicit BlockReader(std::filesystem::path path);
 
-  std::uint64_t size() const { return stamp_.size; }  // of the whole file
-  // Fills `bytes` with what follows, and returns how many there were: fewer only at the end. If the server of
-  // a network disk has forgotten the open file (ESTALE), the file is opened again. Throws IoError, also if
-  // the file was written or replaced by then.
+  std::uint64_t size() const { return stamp_.size; }  // bytes of the whole file
+  // Reads the next bytes of the file into `bytes` and returns how many they were. There are fewer than asked
+  // for only at the end of the file. If the server of a network disk has forgotten the open file (ESTALE),
+  // the file is opened again. Throws IoError, also if the file was written or replaced in the meantime.
   std::size_t read(std::span<char> bytes);
 
  private:
@@ -36,17 +36,17 @@ class LineReader {
  public:
   explicit LineReader(std::filesystem::path path) : file_(std::move(path)) {}
 
-  // The next line, without its line feed; nothing at the end. The text holds until the next call. Throws
-  // IoError.
+  // Returns the next line without its line feed, or nothing at the end of the file. The text is valid until
+  // the next call. Throws IoError.
   std::optional<std::string_view> next();
-  // Whether the line that next() gave last ended with a line feed.
+  // Returns whether the line that next() returned last ended with a line feed.
   bool was_whole() const { return was_whole_; }
 
  private:
   BlockReader file_;
-  std::string text_;  // that was read and not given yet, from at_ on
+  std::string text_;  // text that was read; next() has returned it up to at_
   std::size_t at_ = 0;
-  bool is_read_ = false;  // all of the file is
+  bool is_read_ = false;  // the whole file was read
   bool was_whole_ = true;
 };
 

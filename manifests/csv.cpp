@@ -52,7 +52,8 @@ bool CsvReader::take(char c) {
   return true;
 }
 
-// The end of the text ends a line too, but there is nothing to take. A CR that ends the text counts as CRLF.
+// Takes the end of a line, if there is one. The end of the text also ends a line, but there is nothing to
+// take. A CR at the end of the text counts as CRLF.
 bool CsvReader::take_line_end() {
   const std::string_view rest = text_.substr(std::min(at_, text_.size()));
   if (!rest.starts_with('\n') && !rest.starts_with("\r\n") && rest != "\r") return false;

@@ -1,6 +1,6 @@
-// Comma-separated values in the form of RFC 4180 and Python's csv module: the one reader and the one writer.
-// What a format adds to this (DeepLabCut's header of several rows, pandas' empty cells) is its loader's
-// business.
+// Reads and writes comma-separated values in the form of RFC 4180 and Python's csv module. All CSV files pass
+// through here. Each loader handles what its format adds (DeepLabCut's header of several rows, pandas' empty
+// cells).
 #pragma once
 
 #include <cstddef>
@@ -19,7 +19,8 @@ std::string csv_cell(const std::string& text);
 // "", because an empty line is no row.
 std::string csv_line(const CsvRow& cells);
 
-// Reads the cells of one line after the other. Lines end in LF or CRLF; empty lines are skipped.
+// Reads a text line by line and splits each line into cells. Lines end in LF or CRLF; empty lines are
+// skipped.
 class CsvReader {
  public:
   // `where` names the file in messages. The text must outlive the reader. Spreadsheets of some countries

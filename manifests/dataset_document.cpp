@@ -51,7 +51,7 @@ std::vector<ListedShard> read_listed_shards(const std::filesystem::path& file) {
       shards.push_back({shard_name(shard.at("file")), shard.at("sha256").get<std::string>()});
     }
     return shards;
-  } catch (const std::exception& error) {  // JSON's own, and shard_name's
+  } catch (const std::exception& error) {  // from the JSON library or from shard_name()
     throw std::runtime_error(fmt::format("{}: {}", file.string(), error.what()));
   }
 }

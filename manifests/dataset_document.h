@@ -11,11 +11,12 @@ namespace q3d::manifests {
 inline constexpr const char* kDatasetFormat = "quadruped3d-dataset";
 
 // Reads a whole dataset.json and compares it with the digest at its end. The result is without the digest.
-// Throws DamagedDocument (manifests/sealed_json.h) that names the file if it is not as it was written: no
-// readable JSON, another digest, or none although only schema 1 has none; and IoError.
+// Throws DamagedDocument (manifests/sealed_json.h) that names the file if it is not as it was written: it is
+// no readable JSON, has another digest, or lacks one although its schema is above 1. Throws IoError if it
+// cannot be read.
 nlohmann::ordered_json read_dataset_document(const std::filesystem::path& file);
 
-// The name of a shard in dataset.json, "shards/<file>.h5". Names lead to files that are opened, so they must
+// Returns the name of a shard in dataset.json, "shards/<file>.h5". The named file is opened, so the name must
 // not lead out of the dataset's folder. Throws std::runtime_error for any other value.
 std::string shard_name(const nlohmann::ordered_json& value);
 
@@ -24,8 +25,8 @@ struct ListedShard {
   std::string sha256;
 };
 
-// The shards that a dataset.json lists, in its order. Throws std::runtime_error that names the file, and like
-// read_dataset_document.
+// Returns the shards that a dataset.json lists, in its order. Throws std::runtime_error that names the file,
+// and as read_dataset_document does.
 std::vector<ListedShard> read_listed_shards(const std::filesystem::path& file);
 
 }  // namespace q3d::manifests

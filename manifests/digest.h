@@ -21,10 +21,10 @@ namespace q3d::manifests {
 
 std::string sha256(std::span<const std::byte> bytes);  // 64 lower-case hex digits
 std::string sha256(std::string_view text);
-// A digest in half the space of its digits.
+// A digest as bytes, which take half the space of its hex digits.
 using DigestBytes = std::array<std::uint8_t, 32>;
 std::string to_hex(const DigestBytes& digest);
-std::optional<DigestBytes> digest_from_hex(std::string_view hex);  // nothing if it is no such text
+std::optional<DigestBytes> digest_from_hex(std::string_view hex);  // nothing unless it is 64 hex digits
 
 // Reads the file in blocks. Throws IoError (manifests/file_descriptor.h) when it cannot be read.
 std::string sha256_file(const std::filesystem::path& path);
@@ -64,16 +64,16 @@ class DigestCache {
   struct Entry {
     std::uint64_t size = 0;
     std::int64_t mtime_ns = 0;
-    std::uint64_t inode = 0;  // 0: nothing is remembered
+    std::uint64_t inode = 0;  // 0: no digest is remembered for this path
     DigestBytes sha256{};
   };
   void remember(std::string_view path, const Entry& entry);
 
   std::filesystem::path file_;
-  mutable std::mutex mutex_;  // guards what follows
+  mutable std::mutex mutex_;  // guards the members below
   PathTable paths_;
-  std::deque<Entry> entries_;      // by the path's number
-  mutable bool is_saved_ = false;  // the file holds all of it and nothing else
+  std::deque<Entry> entries_;      // indexed by the path's number in paths_
+  mutable bool is_saved_ = false;  // true if the file holds exactly these entries
 };
 
 }  // namespace q3d::manifests

@@ -42,7 +42,7 @@ bool parse(std::string_view text, Integer& value) {
   return error == std::errc() && end == text.data() + text.size();
 }
 
-// One line of the cache's file. The path is a part of the line.
+// One line of the cache's file. `path` points into the text of the line.
 struct CachedDigest {
   DigestBytes sha256{};
   FileState state;
@@ -78,7 +78,8 @@ bool read_cached(const std::filesystem::path& file, Take&& take) {
   return is_sound;
 }
 
-// The path as it is remembered: absolute, and without detours. Most are so already.
+// Returns the path in the form in which it is remembered: absolute and without detours. Most paths are
+// already in this form.
 std::string key_of(const std::filesystem::path& path) {
   const std::string& text = path.native();
   const bool has_detours = text.find("//") != std::string::npos || text.find("/.") != std::string::npos;

@@ -1,5 +1,5 @@
-// Whether this process syncs and locks its files. Some network disks can do neither; the command line's
-// --no-sync and --no-lock go on without.
+// Says whether this process syncs and locks its files. Some network disks support neither; --no-sync and
+// --no-lock on the command line turn these off.
 #pragma once
 
 #include <filesystem>
@@ -11,7 +11,7 @@ struct Durability {
   bool locks = true;  // a second build of the same folder is refused
 };
 
-// For the whole process; set it before the first file is written.
+// Sets the durability of the whole process. Call it before the first file is written.
 void set_durability(Durability wanted);
 Durability durability();
 

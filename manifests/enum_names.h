@@ -24,7 +24,7 @@ class EnumNames {
     std::copy(std::begin(names), std::end(names), names_.begin());
   }
 
-  // Returns the name of an enumerator. Throws std::out_of_range for a value that is none.
+  // Returns the name of an enumerator. Throws std::out_of_range for a value that is no enumerator.
   std::string_view name(Enum value) const {
     return names_.at(static_cast<std::size_t>(static_cast<int>(value) - first_));
   }

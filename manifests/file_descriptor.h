@@ -17,7 +17,7 @@ namespace q3d::manifests {
 // Every other errno (EIO, ESTALE, EMFILE, EACCES, ...) says nothing about the file's content.
 bool names_no_file(int code);
 
-// The system refused an operation on a file. what() is "cannot <doing> <path>: <reason>".
+// Says that the system refused an operation on a file. what() is "cannot <doing> <path>: <reason>".
 class IoError : public std::runtime_error {
  public:
   IoError(std::string_view doing, std::filesystem::path path, int code);  // the reason is errno's text
@@ -40,8 +40,8 @@ class IoError : public std::runtime_error {
 class FileDescriptor {
  public:
   FileDescriptor() = default;
-  // Calls open(2) with O_CLOEXEC, and again after EINTR and what pause_before_retry() names. A new file gets
-  // mode 0666 less the umask. Throws IoError, as all members do.
+  // Calls open(2) with O_CLOEXEC. Tries again after EINTR and after the errors that pause_before_retry()
+  // accepts. A new file gets mode 0666 less the umask. Throws IoError, as all members do.
   FileDescriptor(const std::filesystem::path& path, int flags);
   ~FileDescriptor();
   FileDescriptor(FileDescriptor&& other) noexcept;
@@ -67,13 +67,13 @@ class FileDescriptor {
   int descriptor_ = -1;
 };
 
-// Whether a call that failed with this errno is worth another try: EAGAIN, and ESTALE, with which network
-// disks answer while their server starts again. If so it sleeps before the try number `attempt` (0, 1, ...):
-// 50, 200 and 800 ms, and leaves errno as it was. False after the last try.
+// Returns whether a call that failed with this errno is worth another try. These errors are EAGAIN, and
+// ESTALE, which network disks return while their server restarts. In that case it first sleeps 50, 200 or 800
+// ms, depending on `attempt` (0, 1, 2), and leaves errno as it was. Returns false after the last try.
 bool pause_before_retry(int code, int attempt);
 
-// Opens a regular file for reading. Throws IoError; a folder, pipe or device names no file, and a named pipe
-// without a writer does not make the caller wait.
+// Opens a regular file for reading. Throws IoError, also for a folder, pipe or device. A named pipe without a
+// writer does not make the caller wait.
 FileDescriptor open_input(const std::filesystem::path& path);
 
 // Opens a regular file and returns read(file). If the server of a network disk has forgotten the open file
@@ -90,7 +90,7 @@ auto read_input(const std::filesystem::path& path, Read&& read) {
   }
 }
 
-// The whole content of a regular file, read once. Throws IoError, also when the file shrinks meanwhile.
+// Returns the whole content of a regular file, read once. Throws IoError, also if the file shrinks meanwhile.
 std::vector<std::byte> read_bytes(const std::filesystem::path& path);
 
 }  // namespace q3d::manifests

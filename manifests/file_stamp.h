@@ -1,6 +1,7 @@
-// Stamps of files: what the file system says of a file without reading it. The kernel sets a file's ctime at
-// every change of its bytes or its other stamps, and no program can set it, so a file whose stamp is the same
-// has not been written since. What rots below the file system leaves the stamp alone.
+// A stamp of a file is what the file system says about the file without reading it. The kernel sets a file's
+// ctime at every change of its bytes or its other stamps, and no program can set it, so a file whose stamp is
+// the same has not been written since. Damage below the file system, such as a decaying disk, does not change
+// the stamp.
 #pragma once
 
 #include <compare>
@@ -23,10 +24,10 @@ struct FileStamp {
   auto operator<=>(const FileStamp&) const = default;
 };
 
-// The stamp of the file or folder, or of what a symbolic link leads to; nothing, and errno, if the kernel
-// gives none.
+// Returns the stamp of the file or folder, or of the target of a symbolic link. Returns nothing, with errno
+// set, if the kernel gives none.
 std::optional<FileStamp> stamp_of(const std::filesystem::path& path);
-// The stamp of an open file. Throws IoError.
+// Returns the stamp of an open file. Throws IoError.
 FileStamp stamp_of(const FileDescriptor& file);
 
 }  // namespace q3d::manifests

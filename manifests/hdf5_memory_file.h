@@ -1,5 +1,4 @@
-// HDF5 files in memory: one that is written there until it is complete, and one whose bytes were read
-// already.
+// Writes HDF5 files in memory, and opens HDF5 files whose bytes are already in memory.
 #pragma once
 
 #include <cstddef>
@@ -29,8 +28,9 @@ class FileImage {
   std::size_t size_ = 0;
 };
 
-// Use it only while a Session exists. Equal calls give equal bytes, because the file has no times and its
-// library-version bounds are fixed. All members throw std::runtime_error that names the attribute or dataset.
+// Composes an HDF5 file in memory. Use it only while a Session exists. Equal calls give equal bytes, because
+// the file has no times and its library-version bounds are fixed. All members throw std::runtime_error that
+// names the attribute or dataset.
 class MemoryFile {
  public:
   MemoryFile();

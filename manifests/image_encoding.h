@@ -12,7 +12,7 @@ enum class ImageEncoding : std::uint8_t { jpeg, png, reference };
 std::string_view to_string(ImageEncoding encoding);
 ImageEncoding image_encoding_from_string(std::string_view name);  // throws std::invalid_argument
 
-// In the order of the enumerators.
+// The names are in the order of the enumerators.
 std::span<const std::string_view> image_encoding_names();
 
 }  // namespace q3d::manifests

@@ -27,8 +27,8 @@ class Journal {
   // Loads the file if it exists; the first append creates it. Throws IoError.
   explicit Journal(std::filesystem::path file);
 
-  // The latest entry of a unit, if its input digest is `input_digest`. Whether its file is sound is for the
-  // caller to find out.
+  // Returns the latest entry of a unit, if its input digest is `input_digest`. The caller must check whether
+  // the unit's file is sound.
   std::optional<JournalEntry> find(std::int64_t unit, const std::string& input_digest) const;
   // Forgets a unit whose file turned out to be damaged. The journal's own file stays as it is.
   void forget(std::int64_t unit) { entries_.erase(unit); }
@@ -36,13 +36,15 @@ class Journal {
   // as it was. Throws std::invalid_argument if entry.file leaves the journal's folder.
   void append(const JournalEntry& entry);
   const std::map<std::int64_t, JournalEntry>& entries() const { return entries_; }
-  // Counts an entry of another journal of the same folder. The file does not hold it before write_anew().
+  // Takes over an entry from another journal of the same folder. The file does not hold it before
+  // write_anew().
   void adopt(const JournalEntry& entry) { entries_.insert_or_assign(entry.unit, entry); }
   // Writes the file atomically with one line for each entry, in the order of the units. Throws IoError.
   void write_anew();
   // True if loading dropped a torn last line. Its unit will be made again.
   bool dropped_torn_line() const { return dropped_torn_line_; }
-  // Numbers, from 1 on, of the other lines that loading dropped: their checksum or their fields do not match.
+  // Returns the line numbers, from 1, of the other lines that loading dropped because their checksum or their
+  // fields do not match.
   const std::vector<std::int64_t>& damaged_lines() const { return damaged_lines_; }
 
  private:
@@ -54,7 +56,7 @@ class Journal {
   std::uint64_t file_bytes_ = 0;   // size of the file, including a torn last line
   bool dropped_torn_line_ = false;
   std::vector<std::int64_t> damaged_lines_;
-  std::optional<std::string> sound_lines_;  // what the file is to hold, until repair() writes it
+  std::optional<std::string> sound_lines_;  // the undamaged lines; set until repair() writes them
 };
 
 }  // namespace q3d::manifests

@@ -1,6 +1,6 @@
-// Builds JSON documents from the events of nlohmann's parser. The library's own builder for callers that want
-// to look at the events searches a list from its beginning after every object in it, so that its time grows
-// with the square of the list's length.
+// Builds JSON documents from the events of nlohmann's parser. The library's own builder with a callback
+// searches a list from its beginning after every object in it, so its time grows with the square of the
+// list's length.
 #pragma once
 
 #include <fmt/format.h>
@@ -25,11 +25,11 @@ class TooDeep : public std::runtime_error {
             "it has objects or lists within each other beyond {} levels, expected at most that", levels)) {}
 };
 
-// Far more than any file of this program or of the tools that it reads has.
+// This is far deeper than any file of this program or of the tools whose files it reads.
 inline constexpr int kMaxJsonDepth = 256;
 
 // A handler for Json::sax_parse. Its functions throw TooDeep beyond kMaxJsonDepth levels, RepeatedKey at the
-// second key of a name in one object, and Json::exception where the text is no JSON.
+// second key of a name in one object, and Json::exception if the text is no JSON.
 template <typename Json>
 class JsonBuilder {
  public:
@@ -111,9 +111,9 @@ class JsonBuilder {
   std::string list_;
   std::function<void(Json&&)> take_;
   Json document_;
-  Json element_;             // of the list
+  Json element_;             // the current element of the list
   std::vector<Json*> open_;  // objects and arrays around the next value
-  Json* member_ = nullptr;   // of the innermost object: the last key's value
+  Json* member_ = nullptr;   // value of the last key of the innermost object
   bool is_list_ = false;     // the last key of the top-level object was that of the list
 };
 

@@ -31,8 +31,8 @@ class JsonText {
   // The text that has been read and masked, from the place up to which it was used.
   std::string_view text() const { return std::string_view(text_).substr(at_, masked_ - at_); }
 
-  // Whether the first block can be read as it is. It cannot if it is in another encoding or no JSON; whoever
-  // reads the file as a whole converts it or says what it is.
+  // Whether the first block can be read as it is. It cannot if it is in another encoding or is no JSON. The
+  // file is then read as a whole, which converts it or reports what it is.
   bool is_plain() const {
     constexpr std::size_t kSearched = 1024;
     return !text().starts_with("\xff\xfe"sv) && !text().starts_with("\xfe\xff"sv) &&
@@ -47,7 +47,7 @@ class JsonText {
   void pop() { ++at_; }
 
  private:
-  // Reads until a further part is masked. Returns false at the end of the file.
+  // Reads on until more of the text is masked. Returns false at the end of the file.
   bool fill() {
     text_.erase(0, at_);
     masked_ -= at_;
@@ -128,7 +128,7 @@ json read_json_elements(const std::filesystem::path& file, const std::string& ke
   std::optional<JsonText> text = opened(file);
   if (!text || text->bytes() > kMaxTextBytes || !text->is_plain()) return read_whole(file, key, take);
   text->skip_mark();
-  // A second look at the whole text finds the line and says what may be meant.
+  // Reading the whole text again finds the line of the error and says what may be meant.
   try {
     return parsed(*text, key, take);
   } catch (const json::parse_error&) {

@@ -13,7 +13,7 @@
 namespace q3d::manifests {
 namespace {
 
-// Whether a line is "key:" or "key: value", with which YAML files begin.
+// Returns whether a line is "key:" or "key: value". YAML files begin with such a line.
 bool is_yaml(std::string_view line) {
   const std::size_t colon = line.find(':');
   const bool ends_key =
@@ -23,7 +23,7 @@ bool is_yaml(std::string_view line) {
              std::string_view::npos;
 }
 
-// Says what the text is that JSON's parser gave up on, if it is known; else "".
+// Says what a text that the JSON parser refused really is, if it is recognised; else returns "".
 std::string hint(std::string_view text, std::string_view reason) {
   if (reason.find("UTF-8") != std::string_view::npos) return " (save the file with the encoding UTF-8)";
   const std::string_view line = text.substr(0, text.find_first_of("\r\n"));
@@ -62,7 +62,7 @@ nlohmann::json read_json_file(const std::filesystem::path& file) {
   } catch (const nlohmann::json::parse_error& error) {
     const std::size_t at = std::min(error.byte, text.size());
     const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n');
-    // The library's message repeats the position, which ends with ": ".
+    // The library's message begins with the position, which ends with ": ".
     std::string reason = error.what();
     const auto colon = reason.find(": ");
     if (colon != std::string::npos) reason.erase(0, colon + 2);
@@ -110,7 +110,7 @@ std::string describe(const nlohmann::json& value) {
   if (value.is_string()) {
     const auto& text = value.get_ref<const std::string&>();
     std::size_t shown = std::min(text.size(), kShown);
-    // Never cut a UTF-8 character, because this description is stored as JSON again.
+    // Never cut a UTF-8 character, because this description is stored as JSON.
     while (shown > 0 && shown < text.size() && (static_cast<unsigned char>(text[shown]) & 0xC0U) == 0x80U)
       --shown;
     return fmt::format("the text \"{}{}\"", text.substr(0, shown), shown < text.size() ? "..." : "");

@@ -1,5 +1,5 @@
-// Refuses JSON objects that give one key twice. JSON's parsers take the last value, or the first, without a
-// word, so that two readers of such a file may see two different files.
+// Refuses JSON objects that give one key twice. JSON parsers silently take the last value, or the first, so
+// two readers of such a file may see different contents.
 #pragma once
 
 #include <functional>
@@ -22,11 +22,12 @@ class RepeatedKey : public std::runtime_error {
 };
 
 // Returns a callback for Json::parse that throws RepeatedKey at the second key of a name in one object, and
-// else asks `next`, if there is one. `Json` is nlohmann::json or nlohmann::ordered_json.
+// otherwise calls `next`, if there is one. `Json` is nlohmann::json or nlohmann::ordered_json.
 template <typename Json>
 typename Json::parser_callback_t refuse_repeated_keys(typename Json::parser_callback_t next = nullptr) {
   using Event = typename Json::parse_event_t;
-  // Shared, because std::function copies what it holds. One set for each open object.
+  // There is one set of keys for each open object. The vector is shared, because std::function copies what it
+  // holds.
   const auto open = std::make_shared<std::vector<std::set<std::string>>>();
   return [open, next = std::move(next)](int depth, Event event, Json& parsed) {
     if (event == Event::object_start) open->emplace_back();

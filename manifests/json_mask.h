@@ -1,4 +1,5 @@
-// Numbers that Python writes into JSON and that JSON cannot hold: NaN, Infinity, and those beyond double.
+// Masks numbers that Python writes into JSON and that JSON cannot hold: NaN, Infinity, and numbers beyond
+// double.
 #pragma once
 
 #include <cstddef>
@@ -10,8 +11,9 @@ namespace q3d::manifests {
 // byte positions stay true. is_beyond_json() (json_file.h) knows these texts.
 class JsonMask {
  public:
-  // Goes over the text from `from` on, and returns how far it is done. If `is_end` is false, more text
-  // follows, and what may be cut in the middle of a word is left for the next call, which must begin there.
+  // Masks the text from position `from` on and returns the position up to which it is done. If `is_end` is
+  // false, more text follows; a word that may be incomplete is left for the next call, which must begin at
+  // the returned position.
   std::size_t apply(std::string& text, std::size_t from, bool is_end);
 
  private:

@@ -1,5 +1,5 @@
-// Whole numbers of JSON documents that may be damaged or hostile. nlohmann's get<int>() cuts 2.5 to 2, takes
-// true for 1, and gives any number at all for one that is too large.
+// Reads whole numbers of JSON documents that may be damaged or hostile. nlohmann's get<int>() cuts 2.5 to 2,
+// takes true for 1, and returns an arbitrary number for one that is too large.
 #pragma once
 
 #include <fmt/format.h>
@@ -11,7 +11,8 @@
 
 namespace q3d::manifests {
 
-// Throws std::runtime_error that says what was found if the value is no whole number from `least` to `most`.
+// Returns the value. Throws std::runtime_error that says what was found if it is no whole number from `least`
+// to `most`.
 template <typename Json>
 std::int64_t whole_number(const Json& value, std::int64_t least = 0,
                           std::int64_t most = std::numeric_limits<std::int64_t>::max()) {

@@ -1,5 +1,5 @@
 // Parses JSON that may be damaged or hostile. nlohmann's parser does not recurse, but copying, comparing and
-// printing a document does, so a text must not be able to choose how deep that goes.
+// printing a document do. So a text must not be able to choose the depth of its document.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -9,7 +9,7 @@
 
 namespace q3d::manifests {
 
-// Throws Json::exception, TooDeep and RepeatedKey.
+// Returns the document. Throws Json::exception, TooDeep and RepeatedKey.
 template <typename Json>
 Json parse_json(std::string_view text) {
   JsonBuilder<Json> builder;
@@ -17,7 +17,7 @@ Json parse_json(std::string_view text) {
   return builder.document();
 }
 
-// The same, for files that only save work: null if the text is no such JSON.
+// Parses a file that only saves work, such as a cache. Returns null where parse_json would throw.
 template <typename Json>
 Json parse_json_or_null(std::string_view text) {
   try {

@@ -1,4 +1,4 @@
-// The names of the 26 keypoints, in the order of every array of keypoints: Animal3D's.
+// The names of the 26 keypoints. Every array of keypoints has this order, which is Animal3D's.
 #pragma once
 
 #include <array>

@@ -24,10 +24,10 @@ void link_or_copy(const fs::path& from, const fs::path& to) {
       fs::permissions(temporary, fs::perms::owner_write, fs::perm_options::add);
       commit_file(temporary, to);
     } else {
-      fs::rename(temporary, to);  // its bytes were made durable when they were written
+      fs::rename(temporary, to);  // the bytes are durable already
     }
   }
-  fs::permissions(to, kReadOnly, error);  // immutable as far as a plain user goes
+  fs::permissions(to, kReadOnly, error);  // an ordinary user cannot change it
 }
 
 }  // namespace q3d::manifests

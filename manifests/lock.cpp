@@ -28,7 +28,8 @@ std::string describe_this_process() {
   return fmt::format("process {} on host {}, started {}", ::getpid(), host.data(), start.data());
 }
 
-// O_NOFOLLOW: a link of this name would let whoever made it choose the file that is overwritten.
+// O_NOFOLLOW is set because a symbolic link of this name would let its author choose the file that is
+// overwritten.
 FileDescriptor open_lock(const std::filesystem::path& file) {
   try {
     return FileDescriptor(file, O_RDWR | O_CREAT | O_NOFOLLOW | O_NONBLOCK);

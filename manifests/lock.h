@@ -11,7 +11,7 @@ namespace q3d::manifests {
 // the process dies. The file says who holds the lock. It is never removed, because then two builds could lock
 // two different files of that name; a symbolic link of that name is refused. Throws std::runtime_error if the
 // folder is in use, with the process, host and start of the holder, and IoError if the folder is absent or
-// not writable, or its file system has no locks. Where durability() says so, nothing is locked.
+// not writable, or its file system has no locks. If durability().locks is false, nothing is locked.
 class FolderLock {
  public:
   explicit FolderLock(const std::filesystem::path& folder);

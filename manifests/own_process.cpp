@@ -17,7 +17,7 @@
 namespace q3d::manifests {
 namespace {
 
-// The first byte of the answer. The rest is the value, or the reason why there is none.
+// The first byte of the answer is one of these. The rest is the value, or the reason why there is none.
 constexpr char kValue = 'v';
 constexpr char kRefusal = 'r';
 
@@ -72,7 +72,7 @@ int wait_for(pid_t child) {
 }
 
 struct Answer {
-  std::string content;       // the first byte says of which kind it is
+  std::string content;       // the first byte is the kind of the answer
   std::string how_it_ended;  // empty if the child came to its end
 };
 

@@ -11,7 +11,7 @@ namespace q3d::manifests {
 namespace {
 
 constexpr std::size_t kBlock = std::size_t{1} << 16U;
-constexpr unsigned kBlockBits = 32;  // of a position; the bits above are the block's number
+constexpr unsigned kBlockBits = 32;  // low bits of a position; the bits above are the block's number
 constexpr std::size_t kFirstSlots = 64;
 
 std::uint32_t hash_of(std::string_view path) {

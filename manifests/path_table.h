@@ -1,4 +1,4 @@
-// The paths of many files in little memory: the name of a folder is held once for all of its files.
+// Holds the paths of many files in little memory: the name of a folder is stored once for all of its files.
 #pragma once
 
 #include <cstddef>
@@ -13,8 +13,8 @@
 
 namespace q3d::manifests {
 
-// A set of paths, each of which has a number: 0, 1, 2, ... in the order in which they came. A path takes the
-// length of its file's name and some 30 bytes. Paths are compared byte for byte. Not thread-safe.
+// A set of paths, each of which has a number: 0, 1, 2, ... in the order in which they came. A path takes some
+// 30 bytes in addition to its file's name. Paths are compared byte for byte. Not thread-safe.
 class PathTable {
  public:
   // Returns the number of the path and whether it is new. Throws std::length_error beyond 2^32 - 1 paths.
@@ -23,8 +23,8 @@ class PathTable {
   std::string path(std::uint32_t number) const;
   std::uint32_t size() const { return static_cast<std::uint32_t>(entries_.size()); }
 
-  // A path is the text of its folder, up to and with the last '/', and a name. Paths of one folder have the
-  // same text here.
+  // A path consists of the text of its folder, including the last '/', and a name. All paths of one folder
+  // share this string.
   const std::string& folder(std::uint32_t number) const { return *folders_[entries_[number].folder]; }
   std::string_view name(std::uint32_t number) const;
 
@@ -43,8 +43,8 @@ class PathTable {
   void grow();
 
   std::deque<Entry> entries_;
-  std::vector<std::uint32_t> slots_;  // open addressing: number + 1, or 0 where nothing is
-  std::deque<std::string> blocks_;    // of kBlock bytes, or of one longer name; names end to end
+  std::vector<std::uint32_t> slots_;  // open addressing: number + 1, or 0 for an empty slot
+  std::deque<std::string> blocks_;    // blocks of kBlock bytes, or of one longer name; names lie end to end
   std::unordered_map<std::string, std::uint32_t> folder_numbers_;
   std::vector<const std::string*> folders_;  // by number; they are the keys of folder_numbers_
 };

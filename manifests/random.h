@@ -1,6 +1,6 @@
 // Random numbers that are the same on every machine and for every number of threads. The standard fixes its
 // engines and not its distributions, so the few distributions that are needed are written out here. The
-// header stands in manifests because that is the lowest room that all its users see.
+// header is in manifests because that is the lowest folder that all its users may include.
 #pragma once
 
 #include <cmath>
@@ -39,7 +39,7 @@ inline std::uint64_t scramble(std::uint64_t z) {
 class Rng {
  public:
   explicit Rng(std::uint64_t seed) : state_(seed) {}
-  // Makes a stream of its own for every key, so that one more draw in one place disturbs no other.
+  // Every key gives an independent stream, so that one more draw in one place does not change the others.
   Rng(std::uint64_t seed, std::initializer_list<std::uint64_t> key) : state_(seed) {
     for (const std::uint64_t part : key) state_ = scramble(state_ ^ (part + kSplitMixStep));
   }

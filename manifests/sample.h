@@ -16,7 +16,7 @@ namespace q3d::manifests {
 
 using smal::kNumBetas;
 using smal::kNumJoints;
-using smal::kNumKeypoints;  // of Animal3D: those of SMAL
+using smal::kNumKeypoints;  // Animal3D annotates the 26 keypoints of SMAL
 
 // One annotated keypoint, in pixels of the source image, with the origin at the top left. The image is as
 // stored, unless the record's `orientation` turns it. `v` is the file's own value, unchanged (-1, 0, 1, 2, or
@@ -42,7 +42,7 @@ enum class Family : std::int8_t { none = -1, felidae = 0, canidae, equidae, bovi
 std::string_view to_string(Family family);
 Family family_from_string(std::string_view name);  // throws std::invalid_argument on an unknown name
 
-// The body of an annotation file, in the file's own form. Sets with 2D keypoints only have none.
+// The body that an annotation file gives, in the file's own form. Datasets with 2D keypoints only have none.
 struct BodyTruth {
   bool has_pose = false;   // not all 105 numbers are zero
   bool has_betas = false;  // not all 41 numbers are zero
@@ -99,7 +99,7 @@ enum class Reason : std::uint8_t {
   // discarded by the user
   vetoed,
   in_test_split,  // its picture, or a copy of it, is in a test split
-  // discarded by the least trust that the config asks for
+  // discarded because the config asks for more trust
   trust_too_low,
 };
 std::string_view to_string(Reason reason);
@@ -117,8 +117,8 @@ struct SampleRecord {
   std::string mask_path;   // absolute; empty when there is none
   int width_px = 0;        // as the annotation says, or as its labels were scaled; 0 when it does not
   int height_px = 0;
-  int orientation = 1;  // EXIF's, by which the stored pixels are turned before anything else; 1 does not turn
-  double scale = 1.0;   // by which box and keypoints were multiplied because the picture had been resized
+  int orientation = 1;  // EXIF orientation by which the stored pixels are turned first; 1 does not turn
+  double scale = 1.0;   // factor applied to box and keypoints because the picture had been resized
   Box box;
   Keypoints keypoints;
   std::optional<BodyTruth> truth;

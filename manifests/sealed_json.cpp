@@ -18,7 +18,7 @@ constexpr std::string_view kBeforeDigits = "  \"digest\": \"";
 constexpr std::string_view kAfterDigits = "\"\n}\n";
 constexpr std::size_t kDigits = 64;
 
-// The text is `body`, then the line of the digest and the closing brace.
+// The parts of a sealed text: `body`, then the line of the digest and the closing brace.
 struct Parts {
   std::string_view body;
   std::string_view digest;

@@ -18,23 +18,25 @@ namespace q3d::manifests {
 
 inline constexpr const char* kDigestKey = "digest";
 
-// A document whose bytes are not those that were written: no readable JSON, or another digest.
+// Says that the bytes of a document are not those that were written: it is no readable JSON, or has another
+// digest.
 class DamagedDocument : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
 // Returns the text of a document: its members, indented by two spaces, then its digest. Throws
-// std::invalid_argument unless `document` is an object with members of which none is named "digest".
+// std::invalid_argument unless `document` is an object that has members, none of them named "digest".
 std::string seal_json(const nlohmann::ordered_json& document);
 
 struct SealedDocument {
   nlohmann::ordered_json document;  // without the digest
-  bool has_digest = false;          // which then is right
+  bool has_digest = false;          // true if the file has a digest, which is then correct
 };
 
 // Reads a document that may have a digest. Throws DamagedDocument that names the file, what was found and
-// what was expected if the text is no JSON object, repeats a key, or differs from its digest; and IoError.
+// what was expected if the text is no JSON object, repeats a key, or differs from its digest. Throws IoError
+// if the file cannot be read.
 SealedDocument read_sealed_json(const std::filesystem::path& file);
 
 }  // namespace q3d::manifests

@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::string_view kFormat = "quadruped3d-shard";
 
-// Returns what a reader without docs/shard-format.md needs to know about each column.
+// Returns a description of each column, for readers who do not have docs/shard-format.md.
 std::string describe_columns() {
   nlohmann::json columns;
   for (const ShardColumn& column : shard_columns()) {
@@ -86,7 +86,7 @@ void add_column(Table& table, const ShardColumn& column, const std::vector<Shard
   }
 }
 
-// The schema that the text states, if this program reads it.
+// Returns the schema that the text states, if this program can read it.
 std::optional<int> known_schema(const std::string& text) {
   for (int schema = 1; schema <= kShardSchema; ++schema) {
     if (text == std::to_string(schema)) return schema;

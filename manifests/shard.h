@@ -1,4 +1,4 @@
-// The shard of the published dataset, its writer (schema 2) and its reader (schemas 1 and 2).
+// The shard of a published dataset, with its writer (schema 2) and its reader (schemas 1 and 2).
 // docs/shard-format.md describes it.
 #pragma once
 
@@ -18,7 +18,7 @@
 
 namespace q3d::manifests {
 
-inline constexpr int kShardSchema = 2;  // the one that is written; every earlier one is read
+inline constexpr int kShardSchema = 2;  // the schema that is written; earlier ones can be read
 
 // One labelled sample. A record that is read from a shard has no absolute paths. Pixel quantities are pixels
 // of the source image unless stated otherwise. Crop units are those of the network's crop (side 1, range
@@ -86,7 +86,7 @@ class ShardReader {
   const TableReader& table() const { return table_; }
   // Returns the rows [first, first + count) with all columns. Throws std::out_of_range for rows that the
   // shard lacks, and std::runtime_error that names path, column and row for a value that the schema does not
-  // know. What schema 1 does not have is as it is by default: trust scores are NaN.
+  // know. Fields that schema 1 lacks keep their defaults; trust scores are NaN.
   std::vector<ShardSample> samples(std::int64_t first, std::int64_t count) const;
 
  private:

@@ -16,7 +16,7 @@ namespace {
 
 using Shape = std::vector<std::int64_t>;
 
-// `access(sample)` gives a reference to a value whose bytes are the row.
+// Makes a column of numbers. `access(sample)` returns a reference to the value whose bytes are the row.
 template <typename T, typename Access>
 ShardColumn numbers(std::string name, Shape shape, std::string units, std::string meaning, Access access) {
   const std::size_t bytes = static_cast<std::size_t>(elements_per_row(shape)) * sizeof(T);

@@ -37,8 +37,9 @@ struct ShardColumn {
   int since = 1;  // the first schema that has the column
 };
 
-// The columns of the newest schema in the order of the document; an older schema has those that are not
-// newer. Loading uses the same order, so truth_present comes before the columns that depend on it.
+// Returns the columns of the newest schema in the order of docs/shard-format.md. An older schema has those
+// whose `since` is not above it. Loading uses the same order, so truth_present comes before the columns that
+// depend on it.
 const std::vector<ShardColumn>& shard_columns();
 
 std::string dtype_of(const ShardColumn& column);  // "float32", ..., "text", "bytes"

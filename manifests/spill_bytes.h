@@ -1,4 +1,4 @@
-// Values as bytes and back, for files that live no longer than their process (spill_file.h).
+// Converts values to bytes and back, for files that live no longer than their process (spill_file.h).
 #pragma once
 
 #include <cstddef>
@@ -32,7 +32,7 @@ class BytesWriter {
   std::vector<std::byte>& bytes_;
 };
 
-// Takes values off the front of the bytes, in the order in which they were written. Throws std::out_of_range
+// Reads values from the front of the bytes, in the order in which they were written. Throws std::out_of_range
 // if the bytes end too early.
 class BytesReader {
  public:

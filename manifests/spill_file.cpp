@@ -10,8 +10,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Not every file system has files without a name. A file whose name is removed at once is the same, but a
-// kill in between leaves it; its suffix is that of what remove_temporaries() removes.
+// Opens a file without a name. Not every file system supports that; elsewhere the name is removed at once. If
+// the process is killed in between, the file stays, and remove_temporaries() removes it by its suffix.
 FileDescriptor nameless(const fs::path& folder) {
   try {
     return {folder.empty() ? fs::path(".") : folder, O_TMPFILE | O_RDWR};

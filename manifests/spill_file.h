@@ -1,4 +1,4 @@
-// Holds on disk what a run needs again and does not keep in memory.
+// Holds data on disk that a run needs again and does not keep in memory.
 #pragma once
 
 #include <cstddef>
@@ -10,11 +10,11 @@
 
 namespace q3d::manifests {
 
-// A file without a name: it goes when it is closed, and when the process ends in any way. What was appended
-// may be read from many threads; appending needs a thread of its own.
+// A file without a name. The system deletes it when it is closed, or when the process ends in any way. Many
+// threads may read what was appended; only one thread may append.
 class SpillFile {
  public:
-  // The file lies in `folder`, which must be there. Throws IoError.
+  // The file lies in `folder`, which must exist. Throws IoError.
   explicit SpillFile(const std::filesystem::path& folder);
 
   // Returns where the bytes begin. Throws IoError (disk full, ...).

@@ -1,4 +1,4 @@
-// The bytes of a table, which are in a file on disk or in memory.
+// The bytes of a table, which lie in a file on disk or in memory.
 #pragma once
 
 #include <cstddef>
@@ -29,7 +29,7 @@ class TableContent {
  private:
   std::filesystem::path path_;
   std::optional<FileDescriptor> file_;
-  std::vector<std::byte> bytes_;  // when file_ is empty
+  std::vector<std::byte> bytes_;  // used if file_ is empty
 };
 
 }  // namespace q3d::manifests

@@ -238,7 +238,7 @@ TableLayout layout_of(hid_t hdf5_file, const TableContent& content) {
 // stages, which were compared with their digest. A Session must exist, so that no other thread holds HDF5's
 // lock when the child begins. Throws std::runtime_error if the child crashed or hung.
 void try_in_own_process(const TableContent& content) {
-  static std::set<FileStamp> sound;  // as they were then; guarded by the session's lock
+  static std::set<FileStamp> sound;  // stamps at the time of the check; guarded by the session's lock
   constexpr std::chrono::seconds kMaxTime{60};
   if (content.in_memory()) return;
   const auto stamp = stamp_of(content.path());
@@ -252,7 +252,8 @@ void try_in_own_process(const TableContent& content) {
   sound.insert(*stamp);
 }
 
-// Calls `read(HDF5 file)` and puts the path before the message of what it throws, unless that names it.
+// Calls `read(HDF5 file)` and puts the path before the message of an exception, unless the message already
+// names it.
 template <typename Read>
 auto with_hdf5(const TableContent& content, Read read) {
   const hdf5::Session session;

@@ -15,7 +15,8 @@ struct TableLayout {
   std::map<std::string, TableReader::Column> columns;
 };
 
-// Opens the content with HDF5, a file a second time, and makes all the checks that TableReader promises.
+// Opens the content with HDF5 and makes all the checks that TableReader promises. A file on disk is opened a
+// second time.
 TableLayout read_table_layout(const TableContent& content);
 
 }  // namespace q3d::manifests

@@ -39,7 +39,8 @@ std::string_view without_leading_space(std::string_view text) {
   return first == std::string_view::npos ? std::string_view() : text.substr(first);
 }
 
-// Web servers answer with a page where a download needs a login, has moved or has used up its quota.
+// Names an HTML or XML page. Web servers send one when a download needs a login, has moved or has used up its
+// quota.
 std::string named_markup(std::string_view content) {
   constexpr std::size_t kShown = 1024;
   std::string start(content.substr(0, kShown));
@@ -72,7 +73,7 @@ void append_utf8(char32_t code, std::string& text) {
   }
 }
 
-// Converts UTF-16 without its mark. A lone half of a pair becomes U+FFFD.
+// Converts UTF-16 without its byte order mark. An unpaired surrogate becomes U+FFFD.
 std::string utf8_from_utf16(std::string_view bytes, bool is_big_endian) {
   std::string text;
   text.reserve(bytes.size() / 2);

@@ -7,8 +7,8 @@
 
 namespace q3d::manifests {
 
-// NaN where a score was not measured: labels that no network gave, candidates without a label, no mask, no
-// priors.
+// A score is NaN where it was not measured: for labels that do not come from a network, for candidates
+// without a label, and where a mask or the priors are missing.
 struct TrustScores {
   static constexpr double kNotMeasured = std::numeric_limits<double>::quiet_NaN();
   double combined = kNotMeasured;

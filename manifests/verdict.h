@@ -24,7 +24,7 @@ LabelKind label_kind_from_string(std::string_view name);  // throws std::invalid
 struct Judgement {
   Verdict verdict = Verdict::failed;
   Reason reason = Reason::none;
-  std::string detail;  // a sentence for people; for a kept sample a remark, if there is one
+  std::string detail;  // a sentence for people; for a kept sample a remark or empty
   // L_proj in crop units (crop side = 1); NaN if it was never computed.
   double initial_error = std::numeric_limits<double>::quiet_NaN();
   double final_error = std::numeric_limits<double>::quiet_NaN();

@@ -48,7 +48,7 @@ void add_scaled(float* __restrict sum, const float* __restrict row, float scale,
   for (std::int64_t i = 0; i < count; ++i) sum[i] += scale * row[i];
 }
 
-// A row's gradient: scaled inputs, added up over the outer products.
+// Computes a row's gradient, which is the sum of scaled inputs over the outer products.
 void outer_row(const InstanceGradient& gradient, std::int64_t instance, std::int64_t out,
                std::vector<float>& row) {
   std::fill(row.begin(), row.end(), 0.0F);
@@ -100,8 +100,8 @@ torch::Tensor written_out(const InstanceGradient& gradient) {
   return sum;
 }
 
-// LibTorch's kernel, which takes a number of steps for each tensor: each instance's rows are a tensor of
-// their own.
+// Steps with LibTorch's kernel. It takes a number of steps for each tensor, so each instance's rows are
+// passed as a separate tensor.
 void step_by_libtorch(const std::vector<AdamState>& states, const std::vector<InstanceGradient>& gradients,
                       const std::vector<std::int64_t>& steps, double learning_rate) {
   std::vector<torch::Tensor> parameters, numbers, first, second, counts;

@@ -1,4 +1,4 @@
-// Adam's step for parameters of which every instance of a batch has its own (0.9, 0.999, 1e-8, no weight
+// Adam's step for parameters that every instance of a batch has separately (0.9, 0.999, 1e-8, no weight
 // decay).
 #pragma once
 

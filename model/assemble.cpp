@@ -49,7 +49,7 @@ Prediction assemble(const PrimaNet& net, const smal::tensors::SmalBody& body, co
   prediction.betas = output.betas;
   prediction.camera = output.camera;
   prediction.translation = smal::tensors::translation_from_camera(output.camera, focal_px);
-  // Always by the same route, so that asking for vertices changes no bit of the keypoints.
+  // Keypoints are always computed in the same way, so that a request for vertices changes no bit of them.
   prediction.keypoints_3d = body.keypoints(prediction.rotations, output.betas);
   if (with_vertices) prediction.vertices = body.forward(prediction.rotations, output.betas).vertices;
   prediction.keypoints_2d =

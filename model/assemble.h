@@ -10,17 +10,18 @@
 
 namespace q3d::model {
 
-// Throws std::invalid_argument when the features do not have the network's shapes or batch sizes disagree.
+// Throws std::invalid_argument if the features do not have the network's shapes or their batch sizes
+// disagree.
 void require_features(const PrimaNet& net, const ImageFeatures& features);
 
-// pose_6d (B, 210) -> (B, 35, 3, 3).
+// Converts pose_6d (B, 210) to rotations (B, 35, 3, 3).
 torch::Tensor pose_rotations(const torch::Tensor& pose_6d);
 
-// The 26 keypoints of the posed body in the crop: (B, 26, 2) crop units. Differentiable.
+// Returns the 26 keypoints of the posed body in the crop, (B, 26, 2) in crop units. Differentiable.
 torch::Tensor projected_keypoints(const smal::tensors::SmalBody& body, const DecoderOutput& output,
                                   double focal_px);
 
-// initial_betas (B, 41). Differentiable.
+// Returns the prediction of the decoder's output. initial_betas: (B, 41). Differentiable.
 Prediction assemble(const PrimaNet& net, const smal::tensors::SmalBody& body, const DecoderOutput& output,
                     const torch::Tensor& initial_betas, bool with_vertices);
 

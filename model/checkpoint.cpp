@@ -29,7 +29,7 @@ bool is_float(torch::ScalarType type) {
   return type == torch::kFloat32 || type == torch::kFloat16 || type == torch::kBFloat16;
 }
 
-// The body's buffers in an official checkpoint, by their names there.
+// Returns the body's buffers in an official checkpoint, by their names there.
 std::map<std::string, torch::Tensor> body_buffers(const smal::tensors::SmalAsset& asset) {
   return {{"smal.shapedirs", asset.shapedirs},     {"smal.v_template", asset.v_template},
           {"smal.posedirs", asset.posedirs},       {"smal.J_regressor", asset.j_regressor},
@@ -45,7 +45,7 @@ void check_entry(const std::string& name, const torch::Tensor& got, at::IntArray
   }
 }
 
-// Every way in which the file differs from the network, one line each.
+// Returns every difference between the file and the network, one on each line.
 std::vector<std::string> find_faults(const smal::tensors::SafeTensors& file, const PrimaNet& net,
                                      const smal::tensors::SmalAsset& asset) {
   std::vector<std::string> faults;
@@ -75,7 +75,7 @@ std::vector<std::string> find_faults(const smal::tensors::SafeTensors& file, con
   return faults;
 }
 
-// Drops the file's pages from this process once their numbers are copied; the kernel's cache keeps them.
+// Releases the file's pages from this process after their numbers were copied; the kernel's cache keeps them.
 // Without this the mapping of a full-size file counts as a second copy of the weights.
 void release_pages(const torch::Tensor& mapped) {
   const auto page = static_cast<std::uintptr_t>(::sysconf(_SC_PAGESIZE));
@@ -143,7 +143,7 @@ std::shared_ptr<PrimaNet> load_net(const smal::tensors::SafeTensors& file, const
   auto net = std::make_shared<PrimaNet>(config, placement);
   for (auto& parameter : net->named_parameters()) {
     const torch::Tensor stored = file.tensor(parameter.key());
-    // One such number makes every prediction NaN, and a build would fail each candidate for it.
+    // One number that is not finite makes every prediction NaN, and a build would then fail every candidate.
     if (!stored.isfinite().all().item<bool>()) {
       throw std::runtime_error(
           fmt::format("{}: {} holds NaN or infinity, expected finite numbers; take a checkpoint from before "

@@ -1,4 +1,4 @@
-// Reading and writing network weights as safetensors under the official names. The sizes travel in the file's
+// Reads and writes network weights as safetensors under the official names. The sizes are in the file's
 // metadata, as JSON under "prima_config".
 #pragma once
 
@@ -25,23 +25,24 @@ struct TensorSpec {
   bool operator==(const TensorSpec&) const = default;
 };
 
-// Every tensor of the network in the module's order, without allocating any.
+// Returns the specification of every tensor of the network in the module's order, without allocating any.
 std::vector<TensorSpec> expected_tensors(const PrimaConfig& config);
 
-// True for what a checkpoint may carry although the network does not hold it: CLIP's text tower,
+// Returns whether a checkpoint may hold this tensor although the network does not: CLIP's text tower,
 // discriminator.*, the priors, `initialized`, smal.* and training.*, the state of a training run.
 bool is_allowed_extra(const std::string& name);
 
-// The config in the file's metadata. Throws std::runtime_error when it is absent or not valid.
+// Returns the config in the file's metadata. Throws std::runtime_error if it is absent or not valid.
 PrimaConfig checkpoint_config(const smal::tensors::SafeTensors& file);
 
 // Builds the network and copies the weights in, casting float16 and bfloat16 files. Strict: throws
 // std::runtime_error that names every missing, extra, wrong-shaped or wrongly typed tensor; smal.* must have
-// the asset's shapes. At no time are two full copies in memory.
+// the asset's shapes. There are never two full copies in memory.
 std::shared_ptr<PrimaNet> load_net(const smal::tensors::SafeTensors& file, const PrimaConfig& config,
                                    const smal::tensors::SmalAsset& asset, const Placement& placement);
 
-// Writes the tensors with the config, and what else is given, in the metadata. Throws std::runtime_error.
+// Writes the tensors, with the config and the given further entries in the metadata. Throws
+// std::runtime_error.
 void write_checkpoint(const std::filesystem::path& path, const PrimaConfig& config,
                       const smal::tensors::NamedTensors& tensors,
                       const std::map<std::string, std::string>& more_metadata = {});

@@ -1,5 +1,5 @@
-// LibTorch has no C++ functions for the operators of its own compiler, but keeps them in its table of
-// operators.
+// Finds operators of LibTorch's own compiler in its table of operators, because LibTorch has no C++ functions
+// for them.
 #pragma once
 
 #include <ATen/core/dispatch/Dispatcher.h>

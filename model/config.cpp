@@ -22,7 +22,7 @@ using Member = std::variant<std::int64_t PrimaConfig::*, double PrimaConfig::*, 
 struct Field {
   std::string_view key;
   Member member;
-  std::int64_t least = 1;  // of a size
+  std::int64_t least = 1;  // least value of a size
 };
 
 constexpr std::array kFields{

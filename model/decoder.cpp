@@ -20,7 +20,7 @@ const TokenGrid& grid_of(bool true_token_grid) {
   return true_token_grid ? kTrueGrid : kOfficialGrid;
 }
 
-// Sine and cosine of one axis: position (N) in [0, 1) -> (N, half).
+// Encodes one axis by sines and cosines: position (N) in [0, 1) -> (N, half).
 torch::Tensor encode_axis(const torch::Tensor& position, std::int64_t half) {
   const torch::Tensor exponent =
       torch::arange(half, position.options()) * 2.0 / static_cast<double>(2 * half);
@@ -55,7 +55,8 @@ torch::Tensor sample_grid(const torch::Tensor& source, const torch::Tensor& xy, 
   return torch::bmm((down * across).flatten(2).to(source.scalar_type()), source);
 }
 
-// apply_mlp for one set of weights an instance, with leaves in place of the biases.
+// Does the same as apply_mlp for one set of weights for each instance, with leaves of the graph in place of
+// the biases.
 torch::Tensor apply_taped(const MlpWeights& weights, const torch::Tensor& x, MlpTape& tape) {
   MlpWeights taped = weights;
   taped.hidden_bias = weights.hidden_bias.detach().requires_grad_();
@@ -70,7 +71,7 @@ torch::Tensor apply_taped(const MlpWeights& weights, const torch::Tensor& x, Mlp
 
 }  // namespace
 
-// Post-norm: self-attention, cross-attention to the image, feed-forward.
+// A post-norm layer: self-attention, cross-attention to the image, feed-forward.
 class DecoderLayer : public torch::nn::Module {
  public:
   DecoderLayer(const PrimaConfig& config, const Placement& placement) : dropout_(config.dropout) {
@@ -118,7 +119,8 @@ class DecoderLayer : public torch::nn::Module {
   double dropout_;
 };
 
-// Keypoints are read off the tokens after a layer. They change the input of the next layer by these features.
+// The keypoints that are read from the tokens after a layer, and the features by which they change the input
+// of the next layer.
 struct Decoder::KeypointUpdate {
   torch::Tensor keypoints_2d;  // (B, 26, 2) crop units
   torch::Tensor keypoints_3d;  // (B, 26, 3)
@@ -223,13 +225,14 @@ torch::Tensor Decoder::parameter_token(const DecoderOutput& estimate) const {
   return torch::relu(param_to_token_norm_->forward(param_to_token_->forward(values)));
 }
 
-// tokens (B, 53, D), or (B, 1, D) without keypoint tokens, through all layers -> the parameter token (B, D).
-// Notes the keypoints on the way.
+// Passes tokens (B, 53, D), or (B, 1, D) without keypoint tokens, through all layers. Returns the parameter
+// token (B, D). Stores the keypoints that are read on the way.
 torch::Tensor Decoder::run_layers(torch::Tensor tokens, const DecoderMemory& memory, DecoderOutput& estimate,
                                   const std::string& prefix, const Observer& observe) const {
   for (std::size_t i = 0; i < layers_.size(); ++i) {
     const bool last = i + 1 == layers_.size();
-    // Only the parameter token leaves the last layer, so the others are computed there for observers alone.
+    // Only the parameter token leaves the last layer, so the other tokens are computed there only for
+    // observers.
     tokens = layers_[i]->forward(tokens, memory.keys_values[i], last && !observe ? 1 : 0);
     if (observe) observe(prefix + "layer" + std::to_string(i) + "_tokens", tokens);
     if (last) break;

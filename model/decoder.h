@@ -28,7 +28,7 @@ struct AdaptedParameters {
   MlpWeights pose_head, shape_head, camera_head;
 };
 
-// All that the decoder layers need of an image, computed once however often they run.
+// Everything that the decoder layers need from an image. It is computed once, however often they run.
 struct DecoderMemory {
   std::vector<KeysValues> keys_values;  // a layer: each (B, heads, 192, D / heads)
   torch::Tensor sampled;                // (B, 192, D): image tokens as they enter the 2D keypoint tokens
@@ -42,9 +42,9 @@ struct DecoderOutput {
   torch::Tensor aux_keypoints_3d;  // (B, 26, 3): not centred
 };
 
-// A perceptron's passes, one a round: what entered its two matrices, and copies of its biases that are leaves
-// of the graph. The gradient of a matrix is the sum over the rounds of outer products of a bias's gradient
-// and its input, so that it need not be written out.
+// Records a perceptron's passes, one for each round: the inputs of its two matrices, and copies of its biases
+// that are leaves of the graph. The gradient of a matrix is the sum over the rounds of outer products of a
+// bias's gradient and its input, so it need not be stored as a matrix.
 struct MlpTape {
   std::vector<torch::Tensor> inputs, hidden_biases;  // (B, in), (B, hidden)
   std::vector<torch::Tensor> hidden, out_biases;     // (B, hidden), (B, out)
@@ -64,12 +64,13 @@ class Decoder : public torch::nn::Module {
 
   // bio_token (B, embed_dim) -> (B, 41); zeros where the config takes no betas from it.
   torch::Tensor initial_betas(const torch::Tensor& bio_token) const;
-  // betas (B, 41) -> (B, 128) of unit length, for the contrastive loss.
+  // Maps betas (B, 41) to features (B, 128) of unit length, for the contrastive loss.
   torch::Tensor shape_feature(const torch::Tensor& betas) const;
 
   AdaptedParameters own_parameters() const;
 
-  // All iterative-error-feedback rounds. initial_betas (B, 41). With `tapes`, the heads are noted there.
+  // Runs all rounds of iterative error feedback. initial_betas: (B, 41). With `tapes`, the passes of the
+  // heads are recorded there.
   DecoderOutput refine(const DecoderMemory& memory, const torch::Tensor& initial_betas,
                        const AdaptedParameters& parameters, const Observer& observe = {},
                        HeadTapes* tapes = nullptr) const;

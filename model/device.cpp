@@ -22,8 +22,8 @@
 namespace q3d::model {
 namespace {
 
-// The driver's own name of a device. LibTorch's header for it needs a CUDA toolkit, the driver library does
-// not, and like LibTorch it honours CUDA_VISIBLE_DEVICES.
+// Returns the driver's own name of a device. LibTorch's header for it needs a CUDA toolkit; the driver
+// library does not, and like LibTorch it respects CUDA_VISIBLE_DEVICES.
 std::string cuda_device_name(int index) {
   void* driver = ::dlopen("libcuda.so.1", RTLD_LAZY | RTLD_LOCAL);
   if (driver == nullptr) return "unknown device";
@@ -45,7 +45,7 @@ bool nvidia_gpu_present() {
          std::filesystem::exists("/proc/driver/nvidia/version", ignored);
 }
 
-// Nothing when the device works; else the reason, found by using it.
+// Returns nothing if the device works, else the reason. It finds out by using the device.
 std::optional<std::string> why_unusable(int index) {
   try {
     const torch::Device device(torch::kCUDA, static_cast<torch::DeviceIndex>(index));
@@ -111,7 +111,8 @@ DeviceChoice choose_device(const std::string& name, int local_rank) {
 
 namespace {
 
-// The libraries pick their matrix kernels by these, and round otherwise with each.
+// Returns the CPU's instruction sets. The libraries choose their matrix kernels by these, and each kernel
+// rounds differently.
 std::string cpu_instructions() {
 #if defined(__x86_64__)
   __builtin_cpu_init();
@@ -127,7 +128,7 @@ std::string cpu_instructions() {
 #endif
 }
 
-// Variables by which a user keeps the libraries from using all that the processor has.
+// Returns the environment variables with which a user limits the instruction sets that the libraries use.
 std::string limits_of_the_environment() {
   std::string text;
   for (const char* name : {"ONEDNN_MAX_CPU_ISA", "DNNL_MAX_CPU_ISA", "MKL_ENABLE_INSTRUCTIONS", "MKL_CBWR"}) {

@@ -1,4 +1,4 @@
-// The one place that knows CUDA exists.
+// Chooses and configures the device. No other file of the model names CUDA.
 #pragma once
 
 #include <torch/types.h>
@@ -13,8 +13,8 @@ struct DeviceChoice {
   std::string warning;      // a GPU that is present but cannot be used, and why; else empty
 };
 
-// "auto" (a usable GPU, else the CPU), "cpu", "cuda", "cuda:I". Of several processes on a machine, numbered
-// by local_rank, "auto" and "cuda" give each the GPU of its number, round and round. Throws
+// "auto" (a usable GPU, else the CPU), "cpu", "cuda", "cuda:I". If several processes run on a machine,
+// numbered by local_rank, "auto" and "cuda" give each the GPU local_rank modulo the number of GPUs. Throws
 // std::invalid_argument for another word and std::runtime_error when a CUDA device was asked for and cannot
 // be used.
 DeviceChoice choose_device(const std::string& name, int local_rank = 0);
@@ -25,8 +25,8 @@ DeviceChoice choose_device(const std::string& name, int local_rank = 0);
 // avx512_bf16, kernels AVX512, packed matrices, LibTorch 2.11.0", "NVIDIA H200, LibTorch 2.11.0".
 std::string arithmetic_of(const DeviceChoice& choice);
 
-// Reproducible kernels, the number of threads a CPU operator may use, and memory that stays with the process
-// instead of going back to the system between two batches.
+// Selects reproducible kernels, sets the number of threads of a CPU operator, and keeps freed memory in the
+// process instead of returning it to the system between batches.
 void configure_compute(int threads);
 
 // While one lives, memory that is freed goes back to the system, which configure_compute otherwise prevents.

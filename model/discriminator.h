@@ -1,4 +1,4 @@
-// Tells plausible poses and shapes from the network's. Paper's warm-up stage; official code:
+// Distinguishes plausible poses and shapes from the network's. Paper's warm-up stage; official code:
 // discriminator.py.
 #pragma once
 

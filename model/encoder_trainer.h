@@ -26,7 +26,8 @@ struct EncoderTrainerOptions {
   std::uint64_t seed = 0;    // of the heads' weights
 };
 
-// The keypoints' places on the ViT's grid of tokens. keypoints (B, 26, 3): x, y in crop units and a weight.
+// The keypoints' positions on the ViT's grid of tokens. keypoints (B, 26, 3): x, y in crop units and a
+// weight.
 struct TokenTargets {
   torch::Tensor share;   // (B, 26, 192) float32: bilinear shares of the four nearest tokens, summing to 1
   torch::Tensor weight;  // (B, 26) float32: 0 also for keypoints outside the grid

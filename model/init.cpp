@@ -30,7 +30,7 @@ bool contains(std::string_view name, std::string_view part) {
   return name.find(part) != std::string_view::npos;
 }
 
-// Layer norms, group norms, and the norms of an EfficientNet.
+// Returns whether a tensor belongs to a layer norm, a group norm, or a norm of an EfficientNet.
 bool is_norm(std::string_view name) {
   return contains(name, "norm") || contains(name_in_efficientnet(name), "_bn") || contains(name, ".ln_") ||
          contains(name, "projection.1.") || contains(name, "param_to_token.1.");
@@ -52,8 +52,9 @@ bool is_stem_convolution(const TensorSpec& spec) {
   return in_stem && spec.shape.size() == 4;
 }
 
-// The spread of a tensor that is neither constant nor a norm. Embeddings have the official standard
-// deviation; matrices the fan-in rule of torch.nn.Linear, and biases none.
+// Returns the bound of the uniform distribution for a tensor that is neither constant nor a norm. Embeddings
+// get the official standard deviation, matrices follow the fan-in rule of torch.nn.Linear, and the bound of
+// biases is zero.
 double uniform_bound(const TensorSpec& spec) {
   if (is_embedding(spec.name)) return std::sqrt(3.0) * kEmbeddingStd;
   if (spec.shape.size() < 2) return 0.0;
@@ -67,8 +68,9 @@ double uniform_bound(const TensorSpec& spec) {
 }
 
 // Sines and cosines of a token's row and column, a quarter of the width each, after a first row of zeros for
-// the class token: (1 + rows * columns, width). A ViT that starts with them knows what is next to what, which
-// random positions would have to learn (Vaswani et al. 2017; Chen et al. 2021, MoCo v3).
+// the class token: (1 + rows * columns, width). A ViT that starts with them knows which tokens are
+// neighbours; with random positions it would have to learn this (Vaswani et al. 2017; Chen et al. 2021, MoCo
+// v3).
 torch::Tensor grid_positions(std::int64_t rows, std::int64_t columns, std::int64_t width) {
   torch::Tensor positions = torch::zeros({1 + rows * columns, width});
   const std::int64_t waves = width / 4;

@@ -10,8 +10,8 @@
 
 namespace q3d::model {
 
-// The initial float32 values of one tensor: a function of its name, its shape and the seed alone, and the
-// same bytes on every machine. Norms start at one and zero, init_pose at the identity, init_cam at the
+// Returns the initial float32 values of one tensor. They depend only on its name, its shape and the seed, and
+// are the same on every machine. Norms start at one and zero, init_pose at the identity, init_cam at the
 // official camera, biases at zero, matrices and embeddings uniform.
 torch::Tensor initial_tensor(const TensorSpec& spec, std::uint64_t seed);
 

@@ -6,12 +6,12 @@
 namespace q3d::model {
 namespace {
 
-// An affine map with x cast to the matrix's dtype.
+// Applies an affine map, with x cast to the matrix's dtype.
 torch::Tensor affine(const torch::Tensor& x, const torch::Tensor& weight, const torch::Tensor& bias) {
   return torch::linear(x.to(weight.scalar_type()), weight, bias);
 }
 
-// Frees a parameter's numbers. It stays in the module under its name.
+// Frees a parameter's numbers. The parameter stays in the module under its name.
 void release(torch::Tensor& parameter) {
   parameter.set_data(torch::empty({0}, parameter.options()));
 }

@@ -1,9 +1,10 @@
 // The building blocks that the encoders and the decoder share.
 //
-// Matrices may be held in bfloat16: activations are cast at a matrix's door, its product comes back in the
+// Matrices may be held in bfloat16: activations are cast before a matrix product, the product has the
 // matrix's dtype, and adding that to the float32 residual stream gives float32 again. Layer norms, embeddings
-// and the regression heads stay float32. With float64 matrices all is float64: too slow for use, but it tells
-// a rounding error from a mistake. Memory is left uninitialised: weights come from a checkpoint.
+// and the regression heads stay float32. With float64 matrices everything is float64, which is too slow for
+// use but separates rounding errors from mistakes. Memory is left uninitialised: weights come from a
+// checkpoint.
 #pragma once
 
 #include <torch/nn/module.h>
@@ -28,7 +29,7 @@ struct Placement {
   Placement unreduced() const { return {device, vector_dtype()}; }  // matrices too as vectors are
 };
 
-// Sees named intermediate tensors of a forward pass; an empty one costs nothing. For tests and debugging.
+// Receives named intermediate tensors of a forward pass, for tests and debugging. An empty one costs nothing.
 using Observer = std::function<void(const std::string& name, const torch::Tensor& tensor)>;
 
 class Linear : public torch::nn::Module {
@@ -38,7 +39,8 @@ class Linear : public torch::nn::Module {
   torch::Tensor forward(const torch::Tensor& x, Activation activation = Activation::none) const;
   // x W^T alone, without the bias.
   torch::Tensor multiply(const torch::Tensor& x) const;
-  // Packs the weight and empties the parameter, so that the numbers are held once. The layer is frozen then.
+  // Packs the weight and empties the parameter, so that the numbers are stored once. The layer is frozen
+  // afterwards.
   void pack();
 
   torch::Tensor weight;  // (out, in), or empty once packed

@@ -1,4 +1,5 @@
-// A training run can train all that takes one step at a time and has a state that continues bit for bit.
+// The interface of everything that a training run can train. A learner takes one step at a time, and its
+// state can be restored bit for bit.
 #pragma once
 
 #include <torch/types.h>
@@ -47,14 +48,14 @@ class Learner {
   // is gone.
   virtual StepReport step(const TrainingBatch& batch) = 0;
 
-  // All that the next step depends on but the batch and the random generator: weights under their official
-  // names, and under "training." the optimisers and the step count. Equal on all ranks.
+  // Returns everything on which the next step depends except the batch and the random generator: weights
+  // under their official names, and optimisers and step count under "training.". It is equal on all ranks.
   virtual smal::tensors::NamedTensors state() const = 0;
   // Throws std::runtime_error naming the tensor, got and expected.
   virtual void restore(const smal::tensors::SafeTensors& file) = 0;
 };
 
-// One copy from the device for all of them.
+// Copies all scalars from the device in one transfer.
 std::vector<double> to_host(const std::vector<torch::Tensor>& scalars);
 
 }  // namespace q3d::model

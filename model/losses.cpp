@@ -80,7 +80,8 @@ PartialMean contrastive_loss(const torch::Tensor& features, const torch::Tensor&
   const torch::Tensor logits = similarity - std::get<0>(similarity.max(1, /*keepdim=*/true)).detach();
   const torch::Tensor others = (1.0 - torch::eye(views.size(0), features.options())) * takes_part;
   const torch::Tensor positives = (label.unsqueeze(1) == label).to(features.scalar_type()) * others;
-  // An anchor that takes no part may have no other; 1 keeps its logarithm finite until it is masked.
+  // An anchor that is left out may have no other sample to compare with; 1 keeps its logarithm finite until
+  // it is masked.
   const torch::Tensor denominator = (logits.exp() * others).sum(1, /*keepdim=*/true);
   const torch::Tensor log_share =
       logits - torch::where(denominator > 0, denominator, torch::ones_like(denominator)).log();
@@ -110,7 +111,7 @@ LossTerms loss_terms(const Prediction& prediction, const Targets& targets, const
                              &terms.aux_keypoints_3d, &terms.global_orient, &terms.pose, &terms.betas}) {
     if (ranks.size() > 1) *sum = *sum * ranks.size();
   }
-  // Every rank computes it of all ranks' features.
+  // Every rank computes this loss over the features of all ranks.
   terms.contrastive = contrastive_loss(ranks.gather(prediction.shape_feature), ranks.gather(targets.family));
   return terms;
 }

@@ -14,8 +14,8 @@
 
 namespace q3d::model {
 
-// The truth that is known of a batch. All tensors but `family` are float32, and flags are 0 or 1. Where a
-// flag is 0, the numbers that it speaks of are not used, but must be finite.
+// The known truth of a batch. All tensors but `family` are float32, and flags are 0 or 1. If a flag is 0, its
+// numbers are not used, but they must be finite.
 struct Targets {
   torch::Tensor keypoints_2d;  // (B, 26, 3): x, y in crop units and a weight
   torch::Tensor keypoints_3d;  // (B, 26, 4): SMAL units in the camera's frame, and a weight
@@ -29,8 +29,8 @@ struct Targets {
 void check_targets(const Targets& targets);
 Targets to_device(const Targets& targets, torch::Device device);
 
-// Scalars on the prediction's device, with their graphs. With several ranks their values and gradients are
-// made such that the mean over the ranks is the joint batch's: sums and the sums of means are scaled by the
+// Scalars on the prediction's device, with their graphs. With several ranks, values and gradients are scaled
+// so that their mean over the ranks is that of the joint batch: sums and the sums of means are scaled by the
 // number of ranks, counts are those of all ranks, and the contrastive loss is of all ranks' features.
 struct LossTerms {
   torch::Tensor keypoints_2d, keypoints_3d;          // of the body

@@ -1,4 +1,4 @@
-// LibTorch's autocast for one scope.
+// Turns on LibTorch's autocast for one scope.
 #pragma once
 
 #include <torch/types.h>

@@ -1,4 +1,4 @@
-// A module's parameters as named tensors and back, bit for bit.
+// Stores a module's parameters as named tensors and restores them, bit for bit.
 #pragma once
 
 #include <torch/nn/module.h>

@@ -1,5 +1,5 @@
-// The network's modules under one roof, with the official checkpoint's parameter names. Starts in training
-// mode, like every torch module; Prima::load hands out a frozen one in evaluation mode.
+// The whole network as one torch module, with the official checkpoint's parameter names. It starts in
+// training mode, like every torch module; Prima::load returns a frozen one in evaluation mode.
 #pragma once
 
 #include <torch/nn/module.h>

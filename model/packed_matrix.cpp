@@ -39,7 +39,7 @@ torch::Tensor multiply_packed(const torch::Tensor& x, const torch::Tensor& packe
   return linear.call(x, packed, bias.defined() ? std::optional(bias) : std::nullopt, name, Scalars(), "none");
 }
 
-// The product with its gradient to x.
+// The product with its gradient with respect to x.
 struct Differentiable : torch::autograd::Function<Differentiable> {
   static torch::Tensor forward(torch::autograd::AutogradContext* context, const torch::Tensor& x,
                                const PackedMatrix* matrix) {

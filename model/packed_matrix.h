@@ -15,11 +15,11 @@ enum class Activation { none, relu, gelu };
 torch::Tensor activate(const torch::Tensor& x, Activation activation);
 
 // Says whether the frozen matrices of a network are packed: on CPUs with AVX-512, in float32 and bfloat16.
-// The rule is fixed, because another choice rounds otherwise: a choice by timing could differ between two
+// The rule is fixed because the two ways round differently, and a choice by timing could differ between two
 // runs.
 bool packs_matrices(torch::Device device, torch::ScalarType dtype);
 
-// Returns what the stage keys say of the rule on a CPU: "packed matrices", or nothing.
+// Returns the text for the rule in the stage keys of a CPU: "packed matrices", or "".
 std::string packing_name();
 
 // x -> x W^T + b. It cannot learn: gradients flow to x alone.

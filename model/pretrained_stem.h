@@ -1,5 +1,5 @@
-// The file of a pre-trained stem: the parameters of an EfficientNetLite, with origin and licence in the
-// metadata. tools/import_stem.py writes it.
+// Reads the file of a pre-trained stem, which holds the parameters of an EfficientNetLite, with origin and
+// licence in the metadata. tools/import_stem.py writes it.
 #pragma once
 
 #include <torch/types.h>

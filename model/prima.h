@@ -49,7 +49,8 @@ class Prima {
   // on another dtype.
   static Prima load(const std::filesystem::path& checkpoint, const std::filesystem::path& smal_asset,
                     torch::Device device, torch::ScalarType dtype = torch::kFloat32);
-  // Takes the net as it is. Throws std::invalid_argument when it and the body are on different devices.
+  // Uses the given network unchanged. Throws std::invalid_argument if the network and the body are on
+  // different devices.
   Prima(std::shared_ptr<PrimaNet> net, smal::tensors::SmalBody body);
 
   // crops (B, 3, 256, 256) uint8 RGB (any device) -> normalised float input on the network's device.

@@ -40,7 +40,7 @@ torch::Tensor read(const smal::tensors::SafeTensors& file, const std::string& na
   return values;
 }
 
-// (B, families): the squares of the betas whitened by each family's statistics.
+// Returns (B, families), the squares of the betas whitened by each family's statistics.
 torch::Tensor shape_squares(const Priors& priors, const torch::Tensor& betas) {
   const torch::Tensor deviation = betas.unsqueeze(1) - priors.mean_betas;  // (B, families, 41)
   return torch::einsum("bfi,fij->bfj", {deviation, priors.betas_prec}).square().sum(2);

@@ -1,5 +1,5 @@
-// The training step: a batch of tensors in, losses out, weights moved. Paper section "Model training";
-// official code: PRIMA.training_step and training_step_discriminator.
+// The training step takes a batch of tensors, computes the losses and updates the weights. Paper section
+// "Model training"; official code: PRIMA.training_step and training_step_discriminator.
 #pragma once
 
 #include <torch/types.h>
@@ -40,7 +40,7 @@ class Trainer : public Learner {
           const TrainerOptions& options,
           std::shared_ptr<const ranks::Collective> ranks = ranks::single_rank());
 
-  // A family that the priors lack is refused.
+  // Also throws for a family that the priors lack.
   StepReport step(const TrainingBatch& batch) override;
 
   std::int64_t steps() const { return steps_; }

@@ -278,7 +278,7 @@ class Adaptation {
     return iterate;
   }
 
-  // Notes the iterates in the results -> per slot, whether the instance goes on.
+  // Stores the iterates in the results. Returns for each slot whether the instance continues.
   std::vector<bool> record(const Iterate& iterate) {
     const torch::Tensor numbers =
         torch::stack({iterate.loss.detach(), iterate.l_proj, iterate.usable.to(iterate.l_proj.scalar_type()),

@@ -57,10 +57,10 @@ struct TtaResult {
 };
 
 // keypoints (B, 26, 3): x, y in crop units and a weight; visible iff weight > 0 (the value is not a weight
-// here). schedules: one an instance; their held-out keypoints must be visible. An instance without visible
-// keypoints is left as it is. One whose loss or numbers become non-finite keeps its last finite iterate.
-// Vertices are not computed. Throws std::invalid_argument on shapes that disagree, a network in training
-// mode, or options out of range.
+// here). schedules: one for each instance; their held-out keypoints must be visible. An instance without
+// visible keypoints is left unchanged. One whose loss or numbers become non-finite keeps its last finite
+// iterate. Vertices are not computed. Throws std::invalid_argument on shapes that disagree, a network in
+// training mode, or options out of range.
 TtaResult adapt(const Prima& prima, const ImageFeatures& features, const torch::Tensor& keypoints,
                 const std::vector<filters::adaptation::Schedule>& schedules, const TtaOptions& options);
 

@@ -1,4 +1,4 @@
-// The instances that are adapting at present, packed into the first rows of every tensor they need.
+// Holds the instances that are currently adapted, packed into the first rows of every tensor that they need.
 #pragma once
 
 #include <torch/types.h>
@@ -28,7 +28,7 @@ struct SlotInputs {
 
 class TtaSlots {
  public:
-  // Room for `capacity` instances, none of which is there yet.
+  // Makes room for `capacity` instances. There are none at first.
   TtaSlots(const AdaptedParameters& initial, std::int64_t capacity);
 
   std::int64_t capacity() const { return capacity_; }

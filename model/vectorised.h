@@ -1,9 +1,9 @@
-// Loops over numbers of our own, compiled for several instruction sets, of which the program takes the
-// processor's own when it starts.
+// A macro for functions with numeric loops. They are compiled for several instruction sets, and the program
+// chooses the processor's when it starts.
 #pragma once
 
-// Stands before such a function. Its loops become vectors at O3 alone, and without no-math-errno a square
-// root could set errno, which keeps its loop from becoming one. Clang writes such a list in another way;
+// Put the macro before such a function. Loops are vectorised only at O3, and a loop with a square root only
+// with no-math-errno, because the root could otherwise set errno. Clang writes such a list in another way;
 // there, the function is compiled once.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
 #define Q3D_VECTORISED \

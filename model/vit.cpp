@@ -61,7 +61,8 @@ class VitBlock : public torch::nn::Module {
   }
 
  private:
-  // Stochastic depth: in training, whole branches of some samples are left out and the others scaled up.
+  // Applies stochastic depth: in training, whole branches of some samples are left out and the others scaled
+  // up.
   torch::Tensor drop_branch(const torch::Tensor& branch) const {
     if (!is_training() || drop_path_ == 0.0) return branch;
     const double keep = 1.0 - drop_path_;

@@ -5,11 +5,11 @@
 
 namespace q3d::smal {
 
-// 35 axis-angle vectors (rad) to 35 row-major 3x3 matrices by Rodrigues' formula, computed in double.
-// Official evaluator: pytorch3d's axis_angle_to_matrix.
+// Converts 35 axis-angle vectors (rad) to 35 row-major 3x3 matrices by Rodrigues' formula, computed in
+// double. Official evaluator: pytorch3d's axis_angle_to_matrix.
 Pose rotation_matrices(const AxisAnglePose& axis_angle);
 
-// The inverse: 35 row-major rotation matrices to 35 axis-angle vectors (rad), computed in double by unit
+// Converts 35 row-major rotation matrices to 35 axis-angle vectors (rad), computed in double by unit
 // quaternions. The angles lie in [0, pi].
 std::array<double, kNumJoints * 3> axis_angles(const Pose& matrices);
 

@@ -10,7 +10,7 @@ namespace q3d::smal {
 
 // All joints are in SMAL's order, joint 0 carries the global orientation, and all arrays are row-major.
 using Pose = std::array<float, kNumJoints * 9>;           // (35, 3, 3): rotation matrices
-using AxisAnglePose = std::array<float, kNumJoints * 3>;  // (35, 3) rad: the form of annotation files
+using AxisAnglePose = std::array<float, kNumJoints * 3>;  // (35, 3) rad: as annotation files state it
 using Betas = std::array<float, kNumBetas>;               // shape coefficients
 // Both are in SMAL units (about metres), in the axes of the crop's camera: x right, y down, z forward.
 using Translation = std::array<float, 3>;

@@ -1,4 +1,5 @@
-// The numbers of the value types of this folder, in the order in which files and tensors hold them.
+// Gives access to the numbers of this folder's value types, in the order in which files and tensors hold
+// them.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// SMAL's sizes.
+// The sizes of SMAL's arrays.
 #pragma once
 
 #include <cstdint>

@@ -2,7 +2,7 @@
 # Checks that C++ sources are formatted as .clang-format says, and changes nothing:
 #   tools/check_format.sh            every tracked source
 #   tools/check_format.sh FILE...    these files
-# Exit code 1 on a file that is not; `make format` formats all of them. Another major version of clang-format lays
+# The exit code is 1 if a file is not; `make format` formats all of them. Another major version of clang-format lays
 # some lines out differently, so version 14 (Debian 12) is required: CLANG_FORMAT names it where it has another name.
 set -euo pipefail
 cd "$(dirname "$0")/.."

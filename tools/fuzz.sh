@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
-# Fuzzes every target for SECONDS (default 60) each: tools/fuzz.sh BUILD_FOLDER [SECONDS] [TARGET...]
-# What libFuzzer breeds stays in BUILD_FOLDER/corpus, so that the next run goes on from there. An input that breaks a
-# promise is kept in BUILD_FOLDER/findings; the run then ends with its name and the command that repeats it.
+# Fuzzes every target for SECONDS (default 60) each: tools/fuzz.sh BUILD_FOLDER [SECONDS] [TARGET...] The inputs that
+# libFuzzer generates stay in BUILD_FOLDER/corpus, where the next run continues. An input that causes a failure is kept
+# in BUILD_FOLDER/findings; the run then ends with its name and the command that repeats it.
 set -euo pipefail
 build=$1
 seconds=${2:-60}
 wanted=("${@:3}")
-# A damaged HDF5 file makes that library ask for petabytes; it takes the refusal for an error, as it should. It also
-# asks for up to 4 GB that it never touches, so memory is judged by what is in use (rss), not by what is asked for.
+# A damaged HDF5 file makes that library request petabytes; it handles the refusal as an error, as it should. It also
+# requests up to 4 GB that it never touches, so the limit applies to the memory in use (rss) and not to requests.
 export ASAN_OPTIONS=allocator_may_return_null=1:${ASAN_OPTIONS:-}
 here=$(cd "$(dirname "$0")/.." && pwd)
 
@@ -31,7 +31,7 @@ while read -r name inputs; do
   grep -E "^stat::number_of_executed_units|^stat::peak_rss_mb" "$log"
 done <"$build/tests/fuzz/targets.txt"
 
-# The importers of official files, which are Python.
+# Fuzz the importers of official files, which are written in Python.
 if ((${#wanted[@]} == 0)) || [[ " ${wanted[*]} " == *" importers "* ]]; then
   python=${FUZZ_PYTHON:-$here/.venv/bin/python}
   if ! "$python" -c "import atheris, numpy" 2>/dev/null; then

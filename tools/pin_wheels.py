@@ -106,7 +106,7 @@ def write(name: str) -> None:
     """Writes NAME.txt from NAME.in."""
     source, target = HERE / f"{name}.in", HERE / f"{name}.txt"
     text = source.read_text(encoding="utf-8")
-    # What the first list pins is there already and is not pinned again.
+    # Packages that the first list pins are already present and are not pinned again.
     there = check_wheels.pins((HERE / f"{BUILD}.txt").read_text(encoding="utf-8")) if name == TESTS else {}
     with tempfile.TemporaryDirectory() as home:
         folder = pathlib.Path(home)

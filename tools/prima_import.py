@@ -17,8 +17,8 @@ from safetensors_file import Tensor
 from torch_checkpoint import TorchFile
 
 CONFIG_KEY = "prima_config"
-# What build and calibrate compare a pool with (pipeline/device/domain.h). The paper's tables have AUC and PCK, which
-# give no quantile of L_proj; tools/describe_checkpoint.py adds them for those who have its test sets.
+# The domain with which build and calibrate compare a pool (pipeline/device/domain.h). The paper's tables have AUC and
+# PCK, which give no quantile of L_proj; tools/describe_checkpoint.py adds them for those who have its test sets.
 DOMAIN_KEY = "prima_domain"
 OFFICIAL_DOMAIN = {
     "pictures": "photographs",

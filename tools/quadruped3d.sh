@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# The main job behind `make quadruped3d`: OUT, and optionally a config. Without a config it makes the rendered sample
-# world first and labels it with the network that ships (models/), so that a newcomer sees a dataset within minutes and
-# without any licence. Its pictures are others than those of data/world, which that network was trained on.
+# The main job behind `make quadruped3d`. Its arguments are OUT and optionally a config. Without a config it makes the
+# rendered sample world first and labels it with the network that ships (models/), so that a newcomer sees a dataset
+# within minutes and without any licence. Its pictures are others than those of data/world, which that network was
+# trained on.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -20,7 +21,7 @@ fi
 layers=(--config "$config")
 # Without a network there is nothing to calibrate: every dataset brings its labels.
 if grep -q '"network"' "$config" && ! grep -q '"tau_low"' "$config"; then
-  # One thresholds file a config: thresholds of another pool or network would be wrong.
+  # Each config has its own thresholds file, because thresholds of another pool or network would be wrong.
   thresholds=$out/thresholds-$(basename "$config" .json).json
   if [ -f "$thresholds" ]; then
     echo "thresholds of an earlier calibration: $thresholds (remove it to calibrate anew)" >&2

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# The paper's three stages on the rendered world, from nothing:
+# Runs the paper's three stages on the rendered world, from scratch:
 #   tools/sample_loop.sh model             pools, pre-trained encoders, Stage 1 (full schedule): models/lite.safetensors
 #   tools/sample_loop.sh loop SCHEDULE SEED   Stage 1, Stage 2, Stage 3, and both networks on the test sets
-# SCHEDULE is full or quick. Every step does what is missing, so a run that was stopped goes on where it was.
+# SCHEDULE is full or quick. Every step makes only what is missing, so a stopped run continues where it was.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -11,8 +11,8 @@ home=data/loop
 
 say() { printf '\n== %s\n' "$*" >&2; }
 
-# Two ranks on any machine, so that two cores are used and the bits do not depend on how many there are. RANKS=1 is
-# for running several trainings side by side.
+# There are two ranks on any machine, so that two cores are used and the bits do not depend on the number of cores. Use
+# RANKS=1 to run several trainings side by side.
 train() {
   if [ "${RANKS:-2}" = 1 ]; then
     "$program" train "$@" --threads 1
@@ -36,7 +36,7 @@ prepare() {
   train --config configs/world_training.json --set frozen_stem_blocks=11 --stage pretrain --out "$home/pretrain"
 }
 
-# The training config's layers for a schedule and a seed; Stage 3 reads what this loop's Stage 2 made.
+# Prints the layers of the training config for a schedule and a seed. Stage 3 reads the output of this loop's Stage 2.
 layers() {
   local schedule=$1 seed=$2 run=$3
   cat >"$run/run.json" <<JSON

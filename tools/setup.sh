@@ -11,7 +11,7 @@
 #   --tests           also install what only the tests need, the wheels of tools/requirements-tests.txt
 #   PYTHON=python3.12 in the environment names the interpreter of .venv (default: python3)
 #
-# What apt and pip print goes to build/setup.log.
+# The output of apt and pip goes to build/setup.log.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 export LC_ALL=C.UTF-8  # apt's and pip's messages are recognised in English
@@ -28,20 +28,20 @@ worked=no
 
 say() { printf 'setup: %s\n' "$*" >&2; }
 
-# fail MESSAGE...: one line each.
+# fail MESSAGE...: prints each message on one line and ends the program.
 fail() {
   say "$1"
   [ $# -lt 2 ] || printf '  %s\n' "${@:2}" >&2
   exit 1
 }
 
-# The last lines that the last command printed.
+# Prints the last lines of the last command's output.
 last_output() {
   awk '/^== /{text = ""; next} !/^Requirement already/ {text = text $0 "\n"} END {printf "%s", text}' "$log" |
     tail -n "$1"
 }
 
-# fail_with_log MESSAGE...: the same, after the end of the log.
+# fail_with_log MESSAGE...: prints the end of the log and then fails like fail.
 fail_with_log() {
   say "the last lines of $log:"
   last_output 15 | sed 's/^/  | /' >&2
@@ -122,14 +122,14 @@ finish_interrupted_dpkg() {
       "Repair it by hand (dpkg --configure -a; apt-get --fix-broken install), then run make setup again."
 }
 
-# What apt would do, simulated. Lines "upgrade NAME OLD NEW" and "new NAME VERSION".
+# Prints what apt would do, found by a simulation, as lines "upgrade NAME OLD NEW" and "new NAME VERSION".
 plan() {
   "${apt_install[@]}" -s "$@" 2>>"$log" | sed -nE \
     -e 's/^Inst ([^ ]+) \[([^]]+)\] \(([^ ]+) .*/upgrade \1 \2 \3/p' -e 's/^Inst ([^ ]+) \(([^ ]+) .*/new \1 \2/p'
 }
 
-# A -dev package needs the library of exactly its own version. Where the library is installed in an older version, this
-# prints NAME=OLD for every new package of the same version that the archive still has in the old one.
+# A -dev package needs the library of exactly its own version. If the library is installed in an older version, this
+# prints NAME=OLD for every new package of the same version that the archive still has in that older version.
 older_versions() {
   local kind old new other fresh version
   while read -r kind _ old new; do
@@ -200,7 +200,7 @@ install_packages() {
 
 # --- Python wheels ---------------------------------------------------------------------------------------------------
 
-# Makes .venv, or repairs it: another Python, no pip. $1 is the list of wheels that it is for.
+# Makes .venv, or repairs it if it has another Python or no pip. $1 is the list of its wheels.
 make_venv() {
   local version pinned
   version=$("$python" -c 'import sys; print("%d.%d" % sys.version_info[:2])') ||
@@ -219,7 +219,7 @@ make_venv() {
     fail_with_log "$python cannot make a virtual environment." "On Debian and Ubuntu it needs the package python3-venv."
 }
 
-# pip_advice LIST: what to do after pip could not install the wheels of this list.
+# pip_advice LIST: says what to do after pip could not install the wheels of this list.
 pip_advice() {
   local again="Then run make setup again; it continues with what is missing."
   case "$(last_output 40)" in
@@ -257,7 +257,7 @@ install_wheels() {
     compgen -G '.venv/lib/python3*/site-packages/torch/lib/libtorch_cpu.so' >/dev/null && return
   open_log
   make_venv "$list"
-  # pip takes a package for installed once its metadata is there, however few of its files were written.
+  # pip regards a package as installed if its metadata exists, even if few of its files were written.
   broken=$(.venv/bin/python tools/check_wheels.py --forget "$list") ||
     say "these packages in .venv are only half there and are installed anew: ${broken//$'\n'/, }"
   mapfile -t missing < <(.venv/bin/python tools/check_wheels.py "$list")
@@ -302,7 +302,7 @@ if [ $python_only = no ]; then
   fi
 fi
 install_wheels build tools/requirements.txt
-# One package of this list is published as source alone. It is built by the setuptools of the first list: pip would
-# fetch one whose digest nobody checks.
+# One package of this list is published only as source. It is built with the setuptools of the first list, because pip
+# would otherwise fetch one whose digest is not checked.
 [ $for_tests = no ] || install_wheels tests tools/requirements-tests.txt --no-build-isolation --use-pep517
 [ $worked = no ] || say "everything is installed ($SECONDS s)"

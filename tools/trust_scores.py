@@ -57,9 +57,9 @@ SCORES = (
     Score("trust_visible", "trust_visible", -1),
 )
 TRUST = Score("trust", "trust", -1)
-# The terms of the combined score, for each kind of label. Of a refined label, L_proj of the prediction says more than
-# that of the label, which adaptation has made small whether the body became right or not. Of a retained label, no other
-# score added anything to L_proj in cross-validation.
+# The terms of the combined score, for each kind of label. For a refined label, L_proj of the prediction is more
+# informative than that of the label, which adaptation makes small even if the body is wrong. For a retained label, no
+# other score improved on L_proj in cross-validation.
 FITTED = {"retained": ("initial_error",),
           "refined": ("initial_error", "trust_aux_2d", "gain", "trust_visible")}
 
@@ -104,7 +104,7 @@ def read_pool(folder: pathlib.Path) -> Pool:
         raise SystemExit(f"{folder}: {len(kept)} labels of the network with a true body, expected 8 or more")
     columns = {score.column: np.array([number(verdicts[name][score.column]) for name in kept])
                for score in (*SCORES, TRUST)}
-    # What was retained was not adapted: it has gained nothing.
+    # Retained labels were not adapted, so they have no gain.
     columns["gain"] = np.where(np.isfinite(columns["gain"]), columns["gain"], 0.0)
     names = [name.rsplit("#", 1)[0] for name in kept]
     return Pool(np.unique(names, return_inverse=True)[1], np.array([number(truth[name][ERROR]) for name in kept]), kept,

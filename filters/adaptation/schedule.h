@@ -9,16 +9,16 @@
 
 namespace q3d::filters::adaptation {
 
-// All fields are of one sample, so that its result does not depend on the other samples of its batch.
+// All fields belong to one sample, so that its result does not depend on the other samples of its batch.
 struct Schedule {
   int iterations = 10;
   double stop_below = 0.0;  // crop units; adaptation ends as soon as L_proj is below it; 0 = never
-  double min_gain = 0.0;    // it ends after gain_window iterations with a smaller relative gain; 0 = never
+  double min_gain = 0.0;    // ends after gain_window iterations if the relative gain is smaller; 0 = never
   int gain_window = 10;
-  // Visible keypoints that the objective does not see. The others must not all be among them. If there are
-  // any, the best iterate is the one of least error on them.
+  // Visible keypoints that the objective does not see. At least one visible keypoint must remain. If any are
+  // held out, the best iterate is the one with the least error on them.
   std::array<bool, smal::kNumKeypoints> held_out{};
-  int patience = 0;  // it ends after so many iterations without a new least held-out error; 0 = never
+  int patience = 0;  // adaptation ends after so many iterations without a new least held-out error; 0 = never
 };
 
 // Returns whether any keypoint is held out.
@@ -28,8 +28,8 @@ bool holds_out(const Schedule& schedule);
 // patience >= 0.
 void check(const Schedule& schedule);
 
-// Returns (L0 - least of iterates 1..window) / L0, over the finite ones of these iterates. `curve` holds
-// L_proj of the iterates 0..n, of which L0 is the first. It is 0 for L0 = 0, and NaN if none of these
+// Returns (L0 - least of iterates 1..window) / L0, over those of these iterates that are finite. `curve`
+// holds L_proj of the iterates 0..n; L0 is its first value. It is 0 for L0 = 0, and NaN if none of these
 // iterates is there and finite. Throws std::invalid_argument for an empty curve.
 double relative_gain(std::span<const double> curve, int window);
 

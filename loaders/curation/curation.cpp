@@ -80,16 +80,17 @@ void keep_clips_whole(std::span<const CuratedPicture> pictures, std::vector<Cura
     if (choices[i].choice != Choice::not_drawn || pictures[i].clip.empty()) continue;
     const auto& sides = frames.at(clip_of(pictures[i]));
     const auto most = std::max_element(sides.begin(), sides.end(), [](const auto& a, const auto& b) {
-      return a.second < b.second;  // the first of equals stays
+      return a.second < b.second;  // of equal counts, the first wins
     });
     if (pictures[i].split != most->first) choices[i].choice = Choice::clip_in_other_split;
   }
 }
 
-// The order in which pictures of one species are taken: the first frame of every video, then the second.
+// Sorts pictures of one species in the order in which they are taken: the first frame of every video, then
+// the second frame, and so on.
 void order_for_drawing(std::span<const CuratedPicture> pictures, std::uint64_t seed,
                        std::vector<std::size_t>& members) {
-  std::vector<std::pair<std::string, std::size_t>> shuffled;  // by a hash that only seed and name decide
+  std::vector<std::pair<std::string, std::size_t>> shuffled;  // sorted by a hash of seed and name
   shuffled.reserve(members.size());
   for (const std::size_t i : members) {
     shuffled.emplace_back(manifests::sha256(fmt::format("{} {}", seed, pictures[i].image_ref)), i);
@@ -119,7 +120,7 @@ std::vector<Curated> curate(std::span<const CuratedPicture> pictures, const Cura
   std::vector<Curated> choices = by_species(pictures, rule);
   keep_clips_whole(pictures, choices);
   for (const auto& [split, total] : rule.pictures) {
-    std::map<std::string, std::vector<std::size_t>> members;  // of the split, by species
+    std::map<std::string, std::vector<std::size_t>> members;  // pictures of the split, by species
     for (std::size_t i = 0; i < pictures.size(); ++i) {
       const bool may_be_drawn = choices[i].choice == Choice::not_drawn && pictures[i].split == split;
       if (may_be_drawn) members[choices[i].species].push_back(i);

@@ -18,8 +18,8 @@ struct CuratedPicture {
   std::string image_ref;  // as the annotation file names it
   std::string source;     // sub-dataset
   std::string species;    // from its name or its source; empty if neither tells it
-  std::string clip;       // the video that it is a frame of (loaders/curation/clip.h); empty if it is none
-  bool usable = true;     // at least one of its records can be used
+  std::string clip;    // the video of which it is a frame (loaders/curation/clip.h); empty if it is no frame
+  bool usable = true;  // at least one of its records can be used
 };
 
 struct CurationRule {

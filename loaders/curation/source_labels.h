@@ -1,5 +1,5 @@
-// Reads species and videos of pictures from the annotation files of a sub-dataset itself, for pictures whose
-// names in a collection do not tell them.
+// Reads species and videos of pictures from a sub-dataset's own annotation files. This is for pictures whose
+// names in a collection do not tell species and video.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,4 @@
-// Animal Kingdom's pose part: 23 keypoints, as a list of MPII-style records or as COCO.
+// Loads Animal Kingdom's pose part: 23 keypoints, as a list of MPII-style records or as COCO.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -19,7 +19,7 @@ const keypoints::Topology& kingdom() {
   return keypoints::topology("animal_kingdom23");
 }
 
-// Reads species and family, and whether the body of a quadruped can represent the animal at all.
+// Reads species and family. Fails a sample whose animal the body of a quadruped cannot represent.
 void add_animal(Loading& loading, RecordReader& reader, SampleRecord& sample) {
   const species::AnimalClass animal{reader.optional_text("animal_parent_class"),
                                     reader.optional_text("animal_class"),

@@ -1,5 +1,6 @@
-// BADJA: for each of its videos a list of frames, [{image_path, segmentation_path, joints, visibility}, ...].
-// A joint is (row, column) of the picture. Its 37 joints are those of the topology "badja".
+// Loads BADJA. It has a list of frames for each of its videos, [{image_path, segmentation_path, joints,
+// visibility}, ...]. A joint is (row, column) of the picture. Its 37 joints are those of the topology
+// "badja".
 #include <fmt/format.h>
 
 #include <cctype>

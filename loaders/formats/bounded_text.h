@@ -1,4 +1,4 @@
-// Texts of annotation files that go into ids, tables and notes.
+// Bounds texts of annotation files that go into ids, tables and notes.
 #pragma once
 
 #include <cstddef>

@@ -25,9 +25,9 @@ struct CocoFile {
   const json& annotations;
   const keypoints::Topology& topology;
   CocoCategories categories;
-  CocoIdMap<const json*> images{};                            // an object, or a file name alone
-  std::unordered_map<std::string, std::string> shared_ids{};  // key of an id that images share -> their names
-  bool ids_are_distinct = false;                              // of the annotations
+  CocoIdMap<const json*> images{};                            // each is an object, or only a file name
+  std::unordered_map<std::string, std::string> shared_ids{};  // key of a shared id -> the images' names
+  bool ids_are_distinct = false;                              // whether all annotations have different ids
 };
 
 std::string file_name_of(const json& image) {
@@ -69,7 +69,7 @@ const json& images_of(const json& document, const Loading& loading) {
   return is_map ? document["images"] : manifests::array_of(document, "images", loading.file);
 }
 
-// Returns the last part of a sample's id. Ids that are texts may hold anything.
+// Returns the last part of a sample's id. An id that is a text may hold anything.
 std::string annotation_part(const CocoFile& file, std::size_t index) {
   if (!file.ids_are_distinct) return std::to_string(index);
   return id_part(coco_id(file.annotations[index], "id")->text);
@@ -199,7 +199,7 @@ std::optional<manifests::Box> read_annotation(CocoFile& file, std::size_t index,
   return pictures::box_around(points, *rules.box_margin);
 }
 
-// The annotations that become records, by their places in the file.
+// Returns the annotations that become records, by their positions in the file.
 std::vector<std::size_t> chosen_annotations(CocoFile& file) {
   std::vector<std::size_t> chosen;
   for (std::size_t i = 0; i < file.annotations.size(); ++i) {
@@ -208,7 +208,8 @@ std::vector<std::size_t> chosen_annotations(CocoFile& file) {
   return chosen;
 }
 
-// Sets the boxes that were made, reads the others as the vote says, and checks all of them.
+// Sets the boxes that were made from keypoints, reads the others in the convention that the vote found, and
+// checks all of them.
 template <typename ReaderOf>
 void settle_boxes(Loading& loading, const CocoRules& rules,
                   const std::vector<std::optional<manifests::Box>>& made_boxes, ReaderOf reader_of,

@@ -19,7 +19,7 @@ using CocoAddition = std::function<void(Loading& loading, RecordReader& annotati
 
 struct CocoRules {
   CocoAddition add;
-  // Is called with an annotation's keypoints in the topology's order, before they are mapped to the 26.
+  // This function gets an annotation's keypoints in the topology's order, before they are mapped to the 26.
   std::function<void(std::span<manifests::Keypoint> keypoints)> weigh{};
   // If an annotation has no box, one is made around its keypoints with this margin (box_around). Without a
   // margin the record fails.
@@ -27,7 +27,7 @@ struct CocoRules {
 };
 
 // Loads all annotations of the chosen categories in file order. Keypoints are found by the names that the
-// categories list, in any order; what is missing gets weight 0. Boxes are read as the majority of the file
+// categories list, in any order; missing ones get weight 0. Boxes are read as the majority of the file
 // indicates (vote_on_boxes) and then checked. `images` is COCO's list, or an object from id to file name.
 // Throws as CocoCategories does, and std::runtime_error if images or annotations are missing.
 Dataset load_coco(const nlohmann::json& document, const keypoints::Topology& topology, Loading& loading,

@@ -142,7 +142,7 @@ const CocoCategory* CocoCategories::of(const json& annotation) {
   if (place != nullptr && !list_[*place].keypoints.empty()) return &list_[*place];
   if (!has_common_) return nullptr;
   if (place != nullptr) {
-    // Its keypoints are read as those of the other categories.
+    // A category without keypoints of its own gets those that the other categories share.
     list_[*place].keypoints = common_.keypoints;
     list_[*place].match = common_.match;
     return &list_[*place];

@@ -21,9 +21,9 @@ struct CocoCategory {
 
 class CocoCategories {
  public:
-  // Reads `categories` and matches the keypoints of those that the dataset's options choose. What is missing
-  // and unknown goes to the notes. Throws std::invalid_argument if the options choose a category that the
-  // file lacks, and std::runtime_error if the keypoints of a chosen category are not those of the topology.
+  // Reads `categories` and matches the keypoints of those that the dataset's options choose. Missing and
+  // unknown keypoints are noted. Throws std::invalid_argument if the options choose a category that the file
+  // lacks, and std::runtime_error if the keypoints of a chosen category are not those of the topology.
   CocoCategories(const nlohmann::json& document, const keypoints::Topology& topology, Loading& loading);
 
   // Returns the annotation's category. If it states none that the file has, returns the only list of
@@ -35,7 +35,7 @@ class CocoCategories {
   // Studio and CVAT write these.
   bool leaves_out(const nlohmann::json& annotation);
 
-  // Appends how many annotations were left out.
+  // Notes how many annotations were left out.
   void add_notes(Loading& loading) const;
 
  private:
@@ -46,7 +46,7 @@ class CocoCategories {
   CocoIdMap<std::size_t> place_of_id_;
   CocoCategory common_;           // for annotations without a category
   bool has_common_ = false;       // whether all categories list the same keypoints
-  bool lists_keypoints_ = false;  // whether a category does
+  bool lists_keypoints_ = false;  // whether any category lists keypoints
   std::size_t left_out_by_choice_ = 0;
   std::size_t left_out_without_keypoints_ = 0;
 };

@@ -21,13 +21,13 @@ struct CocoId {
 // Returns nothing if the value is no id: another type, an empty text, a fraction, or a number that double
 // precision cannot tell from its neighbours.
 std::optional<CocoId> coco_id(const nlohmann::json& value);
-// The same for a field of an object. Returns nothing if the object lacks it.
+// Returns the id in a field of an object, or nothing if the object lacks it.
 std::optional<CocoId> coco_id(const nlohmann::json& object, const char* field);
-// An id that is the key of a JSON object, where numbers can only be texts.
+// Returns the id that a key of a JSON object stands for. Such a key is always a text.
 CocoId coco_id_of_key(const std::string& key);
 
-// Values by id. If a file writes an id as a text in one place and as a number in another, the value is still
-// found, unless two ids have that number ("7" and "07").
+// A map from ids to values. If a file writes an id as a text in one place and as a number in another, the
+// value is still found, unless two ids have that number ("7" and "07").
 template <typename Value>
 class CocoIdMap {
  public:
@@ -36,9 +36,9 @@ class CocoIdMap {
   const Value* find(const CocoId& id);
 
   std::size_t size() const { return values_.size(); }
-  // The number of values that were found although the id was of the other type.
+  // Returns how many values were found although the id was of the other type.
   std::size_t found_as_other_type() const { return found_as_other_type_; }
-  // An id of the map, for messages; empty if there is none.
+  // Returns one id of the map as an example for messages; empty if there is none.
   const std::string& example() const { return example_; }
 
  private:

@@ -1,5 +1,5 @@
-// COCO keypoints of any animals, by a topology file: AP-10K, AnimalPose, a lab's own labels or the output of
-// a pose estimator.
+// Loads COCO keypoints of any animals with a topology file: AP-10K, AnimalPose, a lab's own labels or the
+// output of a pose estimator.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -19,7 +19,7 @@ using manifests::Keypoint;
 using manifests::Reason;
 using manifests::SampleRecord;
 
-// Words that tools write in the place of a species when the user gave none.
+// Words that tools write instead of a species if the user gave none.
 constexpr std::array<std::string_view, 10> kNoSpecies{"default",  "object",   "objects",  "animal",
                                                       "animals",  "instance", "keypoint", "keypoints",
                                                       "skeleton", "pose"};
@@ -41,7 +41,7 @@ std::string left_out_as(const std::string& name) {
 }
 
 // The species is the one that the user gives. Without one, it is the category's name if that is an animal's,
-// else what the picture's name tells, else the category's name as it stands.
+// else the species that the picture's name tells, else the category's name unchanged.
 std::string species_of(const CocoCategory& category, const Loading& loading, const SampleRecord& sample) {
   if (!loading.options.species.empty()) return species::normalised_species(loading.options.species);
   const std::string named = species::normalised_species(category.name);

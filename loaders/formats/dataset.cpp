@@ -25,7 +25,7 @@ using Parser = Dataset (*)(const DatasetOptions&);
 using PieceParser = Dataset (*)(const DatasetOptions&, const TakeRecords&);
 struct Format {
   const char* name = nullptr;
-  Parser parser = nullptr;  // null if there is one that reads piece by piece
+  Parser parser = nullptr;  // null if the format is read piece by piece
   bool takes_topology = false;
   PieceParser piece_parser = nullptr;
 };

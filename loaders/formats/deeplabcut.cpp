@@ -1,5 +1,5 @@
-// DeepLabCut's own files: labels made by hand (CollectedData_*) and predictions with likelihoods, as .h5 or
-// .csv, of one animal or several.
+// Loads DeepLabCut's own files: labels made by hand (CollectedData_*) and predictions with likelihoods, as
+// .h5 or .csv, of one animal or several.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -26,7 +26,7 @@ using manifests::Keypoint;
 using manifests::Reason;
 using manifests::SampleRecord;
 
-// DeepLabCut files keypoints that belong to no animal under this individual.
+// DeepLabCut puts keypoints that belong to no animal under this individual.
 constexpr std::string_view kNoAnimal = "single";
 
 struct PointColumns {
@@ -76,7 +76,7 @@ keypoints::NameMatch match_bodyparts(const keypoints::Topology& topology, const 
   }
 }
 
-// `bodypart_notes` gets what the file lacks, and what the topology does not know.
+// `bodypart_notes` receives the keypoints that the file lacks and those that the topology does not know.
 std::vector<Individual> individuals_of(const LabelTable& table, const keypoints::Topology& topology,
                                        const fs::path& file, Notes& notes,
                                        std::set<std::string>& bodypart_notes) {
@@ -159,7 +159,7 @@ class DeepLabCutLoader {
   }
 
  private:
-  // Returns the file that is named, or a project's labels below the folder that is named.
+  // Returns `annotations` if it is a file, or the label files of the project in that folder.
   std::vector<fs::path> label_files() {
     const fs::path given = loading_.file;
     if (!fs::is_directory(given)) return {given};
@@ -209,13 +209,15 @@ class DeepLabCutLoader {
         NoteKind::caution);
   }
 
-  // A row's picture: its name for the sample's id, and the folder in which to look for it first.
+  // The picture of a row: its name, which becomes part of the sample's id, and the folder in which it is
+  // looked for first.
   struct PicturePlace {
     std::string name;
-    fs::path beside{};  // empty: by the name as it stands
+    fs::path beside{};  // empty: only the name counts
   };
 
-  // Frames of several videos have the same numbers, so each video's pictures lie in a folder of its name.
+  // Returns the pictures of rows that are frame numbers. Frames of different videos share numbers, so the
+  // pictures of each video are looked for in a folder with the video's name.
   std::vector<PicturePlace> numbered_pictures(const LabelTable& table, const fs::path& file) {
     const std::size_t videos = std::max<std::size_t>(table.videos.size(), 1);
     std::vector<PicturePlace> pictures(table.rows.size());
@@ -236,7 +238,7 @@ class DeepLabCutLoader {
     return pictures;
   }
 
-  // Sets the pictures of the rows at `places`, which lie in `subfolder` of the folder of pictures.
+  // Sets the pictures of the rows at `places`. These pictures lie in `subfolder` of the folder of pictures.
   void number_pictures(const LabelTable& table, const std::vector<std::size_t>& places,
                        const std::string& subfolder, const fs::path& file,
                        std::vector<PicturePlace>& pictures) {
@@ -277,7 +279,7 @@ class DeepLabCutLoader {
 
   // DeepLabCut keeps the labels of a folder of pictures in that folder, so pictures are looked for there
   // first: the folder may have been renamed since, or the rows may name no folder. A table whose rows name
-  // several folders was put together from several, so only the names count.
+  // several folders was merged from several tables, so only the names count.
   std::vector<PicturePlace> named_pictures(const LabelTable& table, const fs::path& file) const {
     std::set<std::string> folders;
     for (const std::string& row : table.rows) {
@@ -357,7 +359,7 @@ class DeepLabCutLoader {
   std::vector<SampleRecord> records_;
   std::vector<std::string> annotations_;  // the last part of each record's id
   std::size_t absent_ = 0;
-  bool is_project_ = false;  // the labels are those of a folder
+  bool is_project_ = false;  // true if the labels come from a project's folder
 };
 
 }  // namespace

@@ -81,7 +81,7 @@ bool is_backup(const std::string& name, const Labels& labels) {
   });
 }
 
-// Returns the name of the file to take; nothing if several are left.
+// Returns the name of the file to take, or nothing if several remain.
 std::optional<std::string> chosen(const fs::path& folder, const fs::path& root, const Labels& labels) {
   if (labels.size() == 1) return labels.begin()->first;
   if (const auto scorer = project_scorer(folder, root)) {

@@ -1,4 +1,4 @@
-// Names that people would call the same.
+// Recognises names that people would call the same.
 #pragma once
 
 #include <string>
@@ -11,7 +11,7 @@ namespace q3d::loaders::formats {
 // name that is not valid UTF-8 keeps its accents.
 std::string folded_name(std::string_view name);
 
-// Whether the text is valid UTF-8.
+// Returns whether the text is valid UTF-8.
 bool is_utf8(std::string_view text);
 
 }  // namespace q3d::loaders::formats

@@ -1,7 +1,6 @@
 // Reads HDF5 files that other programs wrote and that may be damaged. Every claim of the file is checked
-// against its size before memory is taken for it, and links to other files are not followed. HDF5 itself
-// can crash on a damaged file, so these functions belong into a process of their own
-// (manifests/own_process.h).
+// against its size before memory is taken for it, and links to other files are not followed. HDF5 itself can
+// crash on a damaged file, so call these functions in a separate process (manifests/own_process.h).
 #pragma once
 
 #include <cstdint>
@@ -22,23 +21,23 @@ class ForeignHdf5 {
   // Uses a file that is open already. It must outlive this object.
   ForeignHdf5(hid_t file, std::uint64_t file_bytes) : file_(file), file_bytes_(file_bytes) {}
 
-  // True if the file itself holds a dataset, or a group, of this name.
+  // Returns whether the file itself holds a dataset, or a group, of this name.
   bool has_dataset(const std::string& name) const;
   bool has_group(const std::string& name) const;
 
-  // The extents of a dataset; none for a scalar.
+  // Returns the extents of a dataset; none for a scalar.
   std::vector<std::uint64_t> extents(const std::string& name) const;
-  // All numbers of a dataset of numbers, row-major.
+  // Returns all numbers of a numeric dataset, row-major.
   std::vector<double> numbers(const std::string& name) const;
-  // All texts of a dataset of texts, of fixed or variable length.
+  // Returns all texts of a text dataset, of fixed or variable length.
   std::vector<std::string> texts(const std::string& name) const;
 
-  // The names of the fields of a table, a one-dimensional dataset of compounds.
+  // Returns the names of the fields of a table, which is a one-dimensional dataset of compounds.
   std::vector<std::string> fields(const std::string& name) const;
-  // One field of all rows of a table. Whole numbers above 2^53 lose digits.
+  // Returns one field of all rows of a table. Whole numbers above 2^53 lose digits.
   std::vector<double> field(const std::string& name, const std::string& field) const;
 
-  // An attribute of a group or dataset; nothing if there is none of this name.
+  // Returns an attribute of a group or dataset, or nothing if there is none of this name.
   std::optional<std::string> text_attribute(const std::string& object, const std::string& attribute) const;
   std::optional<double> number_attribute(const std::string& object, const std::string& attribute) const;
 
@@ -47,7 +46,7 @@ class ForeignHdf5 {
     manifests::hdf5::Handle id;
     manifests::hdf5::Handle type;
     std::vector<hsize_t> extents;
-    std::uint64_t count;  // of elements
+    std::uint64_t count;  // number of elements
   };
   bool has(const std::string& name, H5O_type_t kind) const;
   Opened open(const std::string& name, std::uint64_t element_bytes) const;

@@ -1,4 +1,4 @@
-// One parser for each format, of which load_dataset chooses one, and the parts that they share.
+// Declares one parser for each format and the parts that they share. load_dataset chooses the parser.
 #pragma once
 
 #include <filesystem>
@@ -34,7 +34,7 @@ struct Loading {
   Notes notes;
 };
 
-// A name of a picture and the field that gives it.
+// A picture's name and the field that states it.
 struct PictureName {
   std::string name;
   std::string field;
@@ -49,7 +49,7 @@ void set_found_picture(Loading& loading, RecordReader& reader, const PictureName
                        const FoundPicture& found, const std::string& annotation,
                        manifests::SampleRecord& sample);
 
-// Notes the keypoints that are labelled but lie where tools put points that nobody set (is_placeholder).
+// Notes keypoints that are labelled but lie where tools put points that nobody set (is_placeholder).
 void note_placeholders(Loading& loading, std::span<const manifests::Keypoint> keypoints,
                        const manifests::SampleRecord& sample);
 
@@ -71,7 +71,7 @@ void check_visible(RecordReader& reader, const std::string& field, const manifes
 void set_family(Loading& loading, std::optional<manifests::Family> stated,
                 std::optional<manifests::Family> from_table, manifests::SampleRecord& sample);
 
-// Cuts the texts of records that a hostile file may make as long as it likes.
+// Shortens the texts of records, because a hostile file may make them arbitrarily long.
 void bound_texts(std::vector<manifests::SampleRecord>& records);
 
 // Bounds the records' texts, appends the finder's notes and returns the result.

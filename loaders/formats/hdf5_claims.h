@@ -1,5 +1,5 @@
-// Checks of what an HDF5 file claims that another program wrote and that may be damaged. Every claim is
-// checked against the file's size before memory is taken for it, and nothing of another file is followed.
+// Checks the claims of an HDF5 file that another program wrote and that may be damaged. Every claim is
+// checked against the file's size before memory is taken for it, and links to other files are not followed.
 // HDF5's lock must be held. All functions throw std::runtime_error that names the object (`where`), what was
 // found and what was expected.
 #pragma once

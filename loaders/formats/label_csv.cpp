@@ -1,4 +1,4 @@
-// DeepLabCut's CSV. It has one header row for each level ("scorer", "individuals" if there are several,
+// Reads DeepLabCut's CSV. It has one header row for each level ("scorer", "individuals" if there are several,
 // "bodyparts", "coords") and then one row for each frame. The name of the frame is in the first cell or in
 // the first three.
 //
@@ -58,7 +58,7 @@ char separator_of(std::string_view text) {
   });
 }
 
-// Says whose table begins with this cell, if it is known.
+// Says which tool's table begins with this cell, if it is known.
 std::string known_table(std::string_view first_cell) {
   if (first_cell == "track" || first_cell == "frame_idx" || first_cell == "instance.score") {
     return " (SLEAP's analysis CSV begins with \"track\" too, but has the columns frame_idx and nose.x)";
@@ -128,8 +128,8 @@ double number(const CsvReader& lines, std::string_view cell, bool has_decimal_co
              "a number or nothing");
 }
 
-// Lightning Pose ends its predictions with a column of words, which set a frame belongs to: "set" in the
-// first row of the header, and nothing below it.
+// Lightning Pose ends its predictions with a column that says to which set a frame belongs. Its header is
+// "set" in the first row and empty below.
 bool is_set_column(const std::vector<std::string>& names) {
   return names.front() == "set" &&
          std::all_of(names.begin() + 1, names.end(), [](const std::string& name) { return name.empty(); });
@@ -168,9 +168,9 @@ std::string name_of_row(const Cells& cells, std::size_t name_cells) {
   return row_name(parts);
 }
 
-// DeepLabCut writes x, y and perhaps likelihood of a keypoint side by side; pandas may have sorted them.
-// Where it is otherwise, a row of the header has slipped against the others, and every label would be taken
-// for another keypoint or for the other coordinate.
+// DeepLabCut writes x, y and perhaps likelihood of a keypoint side by side; pandas may have sorted them. In
+// any other order, a row of the header is shifted against the others, and every label would be read as
+// another keypoint or as the other coordinate.
 void check_groups(const CsvReader& lines, const std::vector<LabelColumn>& columns) {
   for (std::size_t first = 0, end = 0; first < columns.size(); first = end) {
     std::vector<std::string> coordinates;
@@ -215,7 +215,7 @@ LabelTable read_label_csv(const std::filesystem::path& file) {
   Cells cells;
   const Header header = read_header(lines, cells);
   LabelTable table;
-  std::vector<std::size_t> places;  // the cell of each column
+  std::vector<std::size_t> places;  // index of each column's cell
   for (std::size_t column = header.name_cells; column < header.width(); ++column) {
     if (header.is_blank(column)) continue;  // a spreadsheet's empty columns
     std::vector<std::string> names;

@@ -10,7 +10,7 @@
 namespace q3d::loaders::formats {
 namespace {
 
-// Spreadsheets may have rounded to whole pixels.
+// A spreadsheet may have rounded coordinates to whole pixels.
 constexpr double kRoundingPx = 0.5;
 
 using ColumnName = std::tuple<std::string, std::string, std::string>;
@@ -23,7 +23,7 @@ bool is_equal(double a, double b) {
   return (std::isnan(a) && std::isnan(b)) || std::abs(a - b) <= kRoundingPx;
 }
 
-// The rows of `table` that `other` lacks: how many, and the first.
+// Says how many rows of `table` are missing in `other`, and names the first.
 std::string lacking(const LabelTable& table, const std::map<std::string, std::size_t>& other) {
   std::size_t count = 0;
   std::string first;

@@ -1,4 +1,4 @@
-// A pandas DataFrame in HDF5, as DataFrame.to_hdf writes it by PyTables. Two layouts:
+// Reads a pandas DataFrame in HDF5, as DataFrame.to_hdf writes it with PyTables. There are two layouts:
 //
 // fixed, for labels made by hand
 //   <key>/block0_values                  (rows, columns) floats
@@ -9,9 +9,9 @@
 //   <key>/table                          (rows) of { index, values_block_0[columns] }
 //   <key>.attrs["non_index_axes"]        the columns' names, pickled
 //
-// Every claim of the file is checked against its size before memory is taken for it. That is not enough:
-// HDF5 1.10 reads beyond its own buffers where an attribute's name is damaged (H5O__attr_exists), so the file
-// is read in a process of its own.
+// Every claim of the file is checked against its size before memory is taken for it. That is not enough: HDF5
+// 1.10 reads beyond its own buffers where an attribute's name is damaged (H5O__attr_exists), so the file is
+// read in a process of its own.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -201,7 +201,7 @@ void read_fixed(const PandasGroup& group, LabelTable& table) {
         group.path("block0_values"));
 }
 
-// The wanted part of the table's rows, as it will lie in memory: the index, then the numbers.
+// The memory layout of the parts of a row that are read: the index, then the numbers.
 struct TableRow {
   Handle type;
   std::size_t index_bytes;
@@ -263,7 +263,7 @@ void read_rows(const PandasGroup& group, LabelTable& table) {
   }
 }
 
-// The first names of a file, which could have thousands.
+// Joins the first few names of a file, which could have thousands.
 std::string joined_names(const std::vector<std::string>& names) {
   constexpr std::size_t kShown = 20;
   std::string text = fmt::format(

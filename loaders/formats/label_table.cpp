@@ -32,7 +32,7 @@ bool is_hdf5(const std::filesystem::path& file) {
 
 namespace {
 
-// Names become parts of ids and notes, which are written as JSON.
+// Throws if a name is not valid UTF-8. Names become parts of ids and notes, which are written as JSON.
 void require_utf8(const LabelTable& table, const std::filesystem::path& file) {
   const bool are_columns =
       std::all_of(table.columns.begin(), table.columns.end(), [](const LabelColumn& column) {

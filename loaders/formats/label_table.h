@@ -17,9 +17,9 @@ struct LabelColumn {
   std::string coordinate;  // x, y or likelihood
 };
 
-// A video that the table's frames are of, as far as the file says.
+// A video to which frames of the table belong, as far as the file says.
 struct LabelVideo {
-  std::string name;  // of its file, without folders and extension
+  std::string name;  // name of its file, without folders and extension
   int width_px = 0;  // 0: unknown
   int height_px = 0;
 };
@@ -51,12 +51,12 @@ LabelTable read_label_hdf5(const std::filesystem::path& file);
 // Reads HDF5 in this process, for fuzzing, which cannot see another process.
 LabelTable read_label_hdf5_here(const std::filesystem::path& file);
 
-// Says in what `other`, the same labels in another file, differs from `table`: in rows, or in numbers by more
-// than 0.5 px ("which differs from it in 2 numbers, ..."). Returns "" if it does not.
+// Says how `other`, which is another file of the same labels, differs from `table`: in its rows, or in
+// numbers by more than 0.5 px ("which differs from it in 2 numbers, ..."). Returns "" if it does not.
 std::string difference_of(const LabelTable& table, const LabelTable& other);
 
-// Makes a column of its names, scorer first, as the file's levels give them: three, or four with individuals.
-// Throws std::runtime_error that names `where` for another number of names.
+// Makes a column from its names on the levels of the header, scorer first. There are three names, or four
+// with individuals. Throws std::runtime_error that names `where` for another number of names.
 LabelColumn label_column(std::vector<std::string> names, const std::string& where);
 
 // Joins the parts of a row's name: "labeled-data", "walk", "img1.png" -> "labeled-data/walk/img1.png".

@@ -8,7 +8,7 @@
 namespace q3d::loaders::formats {
 
 enum class NoteKind : std::uint8_t {
-  remark,   // how a file was read
+  remark,   // says how a file was read
   caution,  // labels were left out or may be wrong. `--quiet` does not hide it
 };
 

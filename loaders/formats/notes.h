@@ -1,4 +1,4 @@
-// Collects the notes of one dataset. Each is given once, with the number of records or files it concerns
+// Collects the notes of one dataset. Each note is given once, with the number of records or files it concerns
 // and the first of them.
 #pragma once
 
@@ -37,7 +37,7 @@ class Notes {
   struct Counted {
     NoteKind kind;
     std::string text;
-    const char* what;  // is counted: a record, a file
+    const char* what;  // the thing that is counted: a record, a file
     std::string first;
     std::size_t times = 1;
   };

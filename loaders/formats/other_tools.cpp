@@ -19,8 +19,8 @@ enum class Place { document, first_of_list, first_value };
 
 struct Form {
   Place place;
-  std::vector<const char*> keys;  // all of them
-  const char* format;             // that reads it; empty if none does
+  std::vector<const char*> keys;  // all of them must be present
+  const char* format;             // the format that reads it; empty if none does
   const char* meaning;
 };
 

@@ -7,11 +7,11 @@
 
 namespace q3d::loaders::formats {
 
-// Says what a document is if its form is known: whose file, and which format reads it or how to get COCO from
-// it. Empty if the form is unknown, or is one that `format` reads.
+// Says what a document is if its form is known: the tool that wrote it, and the format that reads it or how
+// to convert it to COCO. Returns "" if the form is unknown, or is one that `format` reads.
 std::string known_tool(const nlohmann::json& document, const std::string& format);
 
-// Throws std::runtime_error that names the file, and says what known_tool says, if that is not empty.
+// Throws std::runtime_error with the file's name and the text of known_tool(), unless that text is empty.
 void refuse_other_form(const nlohmann::json& document, const std::string& format,
                        const std::filesystem::path& file);
 

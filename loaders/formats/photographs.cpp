@@ -1,5 +1,5 @@
-// Photographs without keypoints, for `predict`: the pictures of a folder, or a file with the boxes of the
-// animals in them (COCO, or MegaDetector's output).
+// Loads photographs without keypoints, for `predict`: the pictures of a folder, or a file with the boxes of
+// the animals in them (COCO, or MegaDetector's output).
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -29,7 +29,8 @@ bool has_picture_extension(const fs::path& path) {
   return std::find(kExtensions.begin(), kExtensions.end(), extension) != kExtensions.end();
 }
 
-// The pictures below a folder, sorted by path, so that their order does not depend on the file system.
+// Returns the pictures below a folder, sorted by path, so that their order does not depend on the file
+// system.
 std::vector<fs::path> pictures_below(const fs::path& folder) {
   std::vector<fs::path> pictures;
   for (const auto& entry : fs::recursive_directory_iterator(folder)) {
@@ -57,7 +58,7 @@ bool set_size(SampleRecord& sample) {
   return true;
 }
 
-// A picture without a box is one animal that fills it.
+// Makes the whole picture the box: a picture without a box counts as one animal that fills it.
 void take_whole_picture(SampleRecord& sample) {
   if (sample.failure != Reason::none) return;
   const bool has_size = set_size(sample);
@@ -102,7 +103,7 @@ bool is_animal(const json& document, const json& detection) {
   return name == names->end() || *name == "animal";
 }
 
-// Leaves out the boxes of too low a score, and counts them. A file may state no scores.
+// Returns whether a box has a high enough score, and counts those that do not. A file may state no scores.
 bool is_sure(Loading& loading, const json& record, const char* field, const SampleRecord& sample) {
   const auto score = record.find(field);
   if (score == record.end() || !score->is_number()) return true;
@@ -113,7 +114,7 @@ bool is_sure(Loading& loading, const json& record, const char* field, const Samp
   return false;
 }
 
-// MegaDetector states boxes as shares of the picture.
+// Scales a box to pixels. MegaDetector states boxes as fractions of the picture's size.
 void scale_box(RecordReader& reader, SampleRecord& sample) {
   if (!set_size(sample)) return;
   const manifests::Box share = sample.box;
@@ -202,7 +203,7 @@ Dataset load_photographs(const DatasetOptions& options) {
   Loading loading(options, "");
   if (fs::is_directory(loading.file)) {
     Dataset dataset = finished(loading, read_folder(loading, loading.file));
-    dataset.files.clear();  // a folder has no digest; every picture has
+    dataset.files.clear();  // a folder has no digest, but every picture has one
     return dataset;
   }
   const json document = manifests::read_json_file(loading.file);

@@ -18,20 +18,20 @@ namespace {
 // The names are in a tuple in a list in a tuple in a list. Limits bound what a few bytes can claim, because a
 // memo repeats a value for three bytes and each level of lists costs two.
 constexpr int kDeepest = 4;
-constexpr std::size_t kMaxNames = 8;  // of one column
+constexpr std::size_t kMaxNames = 8;  // names of one column
 constexpr std::size_t kMaxNameBytes = 1000;
 constexpr std::size_t kMaxColumns = 100'000;
 
 struct List;
-using Items = std::shared_ptr<List>;  // shared, as a pickle's memo shares them
+using Items = std::shared_ptr<List>;  // shared pointer, because a pickle's memo shares lists
 struct Mark {};
 struct Value {
   std::variant<Mark, std::string, std::int64_t, Items> content;
 };
 struct List {
   std::vector<Value> items;
-  int depth = 1;           // of lists within each other
-  bool is_within = false;  // in another list, and so complete: it cannot come to hold itself
+  int depth = 1;           // depth of nested lists
+  bool is_within = false;  // it is inside another list, and so complete: it cannot contain itself
 };
 
 void append_utf8(std::string& text, std::uint32_t code) {

@@ -33,7 +33,7 @@ bool lies_in(const fs::path& path, const fs::path& folder) {
   return std::mismatch(folder.begin(), folder.end(), path.begin(), path.end()).first == folder.end();
 }
 
-// An error that says nothing about whether the file is there must not make its picture a missing one.
+// Throws if the error does not say whether the file exists: such a picture must not count as missing.
 void require_answer(const std::error_code& error, const char* doing, const fs::path& path) {
   if (error && !manifests::names_no_file(error.value())) {
     throw manifests::IoError(doing, path, error.value());
@@ -72,8 +72,8 @@ FoundPicture PictureFinder::find(const std::string& name) {
   const std::vector<NameReading> readings = readings_of(name);
   if (readings.empty()) return {{}, Reason::image_missing, fmt::format("\"{}\", which names no file", name)};
   for (std::size_t i = 0; i < readings.size(); ++i) {
-    // find_exactly() counts a name that leads to the file by "../" or the root's own name. Such a picture
-    // must not be counted again because its reading is not the first.
+    // find_exactly() already counts a name that leads to the file through "../" or the root's own name. Such
+    // a picture must not be counted twice when its reading is not the first.
     const std::size_t counted = found_by_reading_;
     auto found = find_exactly(readings[i]);
     if (!found) continue;
@@ -150,7 +150,7 @@ std::optional<FoundPicture> PictureFinder::find_climbing(const fs::path& path) {
   return std::nullopt;
 }
 
-// Returns what follows the name of the root, or of the folder of pictures, in a path.
+// Returns the parts of a path that follow the name of the root, or of the folder of pictures.
 std::vector<fs::path> PictureFinder::own_tails(const fs::path& path) const {
   std::vector<fs::path> tails;
   for (fs::path rest = path; std::distance(rest.begin(), rest.end()) > 1;) {

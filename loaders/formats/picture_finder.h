@@ -59,7 +59,7 @@ class PictureFinder {
   std::size_t found_by_tail() const { return found_by_tail_; }        // absolute names from elsewhere
   std::size_t found_by_reading() const { return found_by_reading_; }  // backslashes, %20, "../", root's name
   std::size_t found_by_spelling() const { return found_by_spelling_; }  // case, accents, '+', .jpeg
-  // Further names that led to a file found by its tail before.
+  // Returns how many further names led to a file that was already found by its tail.
   std::size_t shared_files() const { return shared_files_; }
 
  private:
@@ -81,14 +81,14 @@ class PictureFinder {
   std::filesystem::path root_;
   std::vector<std::filesystem::path> bases_;    // folders that relative names count from, in order
   std::vector<std::filesystem::path> allowed_;  // folders that pictures may lie in
-  std::filesystem::path annotations_;           // empty if it lies outside these
+  std::filesystem::path annotations_;  // folder of the annotation file; empty if it lies outside allowed_
   std::unordered_map<std::string, std::filesystem::path> resolved_folders_;
-  std::map<std::filesystem::path, Spellings> spellings_;  // of a base: folded name -> files; filled on demand
+  std::map<std::filesystem::path, Spellings> spellings_;  // of a base folder: folded name -> files
   std::size_t found_by_tail_ = 0;
   std::size_t found_by_reading_ = 0;
   std::size_t found_by_spelling_ = 0;
-  manifests::PathTable files_of_tails_;     // found by their tails
-  std::vector<std::uint64_t> first_names_;  // by such a file's number: hash of the first name that led to it
+  manifests::PathTable files_of_tails_;     // files that were found by their tails
+  std::vector<std::uint64_t> first_names_;  // by the file's number: hash of the first name that led to it
   std::size_t shared_files_ = 0;
 };
 

@@ -102,7 +102,7 @@ NameReading reading_of(std::string_view text, bool is_absolute) {
   return {std::move(normal), is_absolute || begins_at_root, begins_at_root && !is_absolute};
 }
 
-// A name without its drive, share, scheme, host and query; backslashes have become '/'.
+// A name without its drive, share, scheme, host and query, in which backslashes have become '/'.
 struct PlainName {
   std::string path;
   std::string query;

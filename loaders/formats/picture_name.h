@@ -1,4 +1,4 @@
-// The names of pictures as labelling tools write them: paths of this or another system, and URLs.
+// Interprets the names of pictures as labelling tools write them: paths of this or another system, and URLs.
 #pragma once
 
 #include <filesystem>
@@ -12,9 +12,9 @@ namespace q3d::loaders::formats {
 struct NameReading {
   std::filesystem::path
       path;                  // normalised, '/' between folders, without drive, share, scheme, host and query
-  bool is_absolute = false;  // it counts from another disk's or server's root, so only its tails can be here
+  bool is_absolute = false;  // it starts at another disk's or server's root, so only its tails can exist here
   bool is_posix_absolute =
-      false;  // it begins with '/' as it stands, so it may also name a file of this system
+      false;  // it begins with '/' as it was written, so it may also name a file of this system
 };
 
 // Returns the ways to understand a name, the most literal one first:

@@ -12,7 +12,7 @@ std::size_t digits_at(std::string_view text, std::size_t at) {
   return count;
 }
 
-// True if nothing follows, or another part after '_'.
+// Returns whether the text ends at this position, or continues with '_'.
 bool ends_at(std::string_view text, std::size_t at) {
   return at >= text.size() || text[at] == '_';
 }

@@ -1,4 +1,4 @@
-// The JSON of PRIMA and AniMer: {"data": [{img_path, mask_path, bbox, keypoint_2d, ...}, ...]}.
+// Loads the JSON of PRIMA and AniMer: {"data": [{img_path, mask_path, bbox, keypoint_2d, ...}, ...]}.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -23,7 +23,8 @@ constexpr std::size_t kPoseNumbers = manifests::kNumJoints * 3;
 constexpr std::size_t kBetas = manifests::kNumBetas;
 constexpr std::size_t kFirstBetas = 20;  // `shape`; the other 21 are `shape_extra`
 
-// `values` come from a reader that has checked their number, so they fit.
+// Converts values to an array of float. `values` come from a reader that has checked their number, so they
+// fit.
 template <std::size_t N>
 void copy_into(std::array<float, N>& target, const std::vector<double>& values, std::size_t at = 0) {
   std::transform(values.begin(), values.end(), target.begin() + static_cast<std::ptrdiff_t>(at),
@@ -36,8 +37,8 @@ bool any_nonzero(const std::array<float, N>& values) {
 }
 
 // Returns how many numbers `shape` holds if they are betas of another shape space than SMAL's 41, such as the
-// 145 of SMAL+; else 0. Their meaning differs, so they are no label here. A pose means the same in both. A
-// handful of numbers is no shape space but a damaged record.
+// 145 of SMAL+; else 0. Such betas mean something else, so they are no label here; a pose means the same in
+// both. A few numbers are not a shape space but a damaged record.
 std::size_t betas_of_another_model(const nlohmann::json& shape) {
   constexpr std::size_t kSmallestShapeSpace = 10;
   const bool is_one =
@@ -47,7 +48,8 @@ std::size_t betas_of_another_model(const nlohmann::json& shape) {
   return is_one ? shape.size() : 0;
 }
 
-// `shape` holds all 41 numbers, or 20 with the other 21 in `shape_extra`, which some exports lack.
+// Reads the betas. `shape` holds all 41 numbers, or 20 with the other 21 in `shape_extra`, which some exports
+// lack.
 void read_betas(const nlohmann::json& record, RecordReader& reader, Loading& loading, const std::string& id,
                 BodyTruth& truth) {
   if (!reader.has("shape")) return;
@@ -94,7 +96,7 @@ std::optional<BodyTruth> read_truth(const nlohmann::json& record, RecordReader& 
   return truth;
 }
 
-// -1 and a missing value both mean that the family is not stated.
+// Reads the family. Both -1 and a missing value mean that it is not stated.
 std::optional<Family> read_family(RecordReader& reader) {
   const auto number = reader.integer("supercategory");
   if (!number || *number == -1) return std::nullopt;

@@ -163,7 +163,7 @@ bool is_placeholder(double x_px, double y_px) {
 bool set_keypoint(double x_px, double y_px, double v, manifests::Keypoint& keypoint) {
   const bool is_position = std::abs(x_px) <= kMaxCoordinatePx && std::abs(y_px) <= kMaxCoordinatePx;
   keypoint = {};
-  if (std::isnan(v) && !is_position) return true;  // all of it missing, as pandas writes it
+  if (std::isnan(v) && !is_position) return true;  // the whole point is missing, as pandas writes it
   if (!std::isfinite(static_cast<float>(v)) || (v > 0.0 && !is_position)) return false;
   keypoint.v = static_cast<float>(v);
   keypoint.weight = v > 0.0 && !is_placeholder(x_px, y_px) ? 1.0F : 0.0F;

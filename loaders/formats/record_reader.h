@@ -32,8 +32,8 @@ class RecordReader {
   std::string optional_text(const std::string& field);     // "" if it is absent
   std::optional<double> number(const std::string& field);  // nothing if it is absent; NaN if it is not finite
   std::optional<std::int64_t> integer(const std::string& field);  // nothing if it is absent
-  // Returns a size of the image in pixels, a number or a text of one; 0 if it is absent, 0 or negative, as
-  // tools write where they do not know it.
+  // Returns the image's width or height in pixels, which the file may write as a number or as text. Returns 0
+  // if it is absent, 0 or negative; tools write such values for an unknown size.
   int size_px(const std::string& field);
 
   // Returns `rows` x `columns` numbers, which may be nested or flat. A number that is null or not finite is
@@ -41,20 +41,21 @@ class RecordReader {
   // or `wrong_length`.
   std::vector<double> numbers(const std::string& field, std::size_t rows, std::size_t columns,
                               manifests::Reason missing, manifests::Reason wrong_length);
-  // The same for a field that must be complete and have only numbers that are finite in float32.
+  // Returns such numbers of a field that must be complete and finite in float32.
   std::vector<double> finite_numbers(const std::string& field, std::size_t rows, std::size_t columns);
 
   // Returns x, y, v of `count` keypoints. The weight is 1 if v > 0 and the point is no placeholder, else 0.
   // Unlabelled points may have any coordinates.
   std::vector<manifests::Keypoint> keypoints(const std::string& field, std::size_t count);
-  // Whether a box is stated. Tools write zeros, -1, null, "" or an empty list where nobody drew one.
+  // Returns whether a box is stated. Tools write zeros, -1, null, "" or an empty list where nobody drew one.
   bool has_box(const std::string& field) const;
-  // Returns four numbers as they stand, the last two as width and height.
+  // Returns the four numbers unchanged, the last two as width and height.
   manifests::Box box(const std::string& field);
 
  private:
   const nlohmann::json* find(const std::string& field) const;
-  // `path` names the value. It is called only if the value is not a number.
+  // Appends a value to the numbers. `path` returns the value's name for the message; it is called only if the
+  // value is not a number.
   bool append(const nlohmann::json& value, const std::function<std::string()>& path,
               std::vector<double>& numbers);
 
@@ -66,7 +67,7 @@ class RecordReader {
 // A labelled keypoint must lie within this many pixels of the origin. A larger number is not a coordinate.
 inline constexpr double kMaxCoordinatePx = 1e6;
 
-// Returns whether this is a place where tools put a point that nobody set: (0, 0) or (-1, -1).
+// Returns whether tools put points that nobody set at this position: (0, 0) or (-1, -1).
 bool is_placeholder(double x_px, double y_px);
 
 // Makes a keypoint of x, y, v. A placeholder has weight 0, whatever its v. Returns false if the keypoint is

@@ -1,4 +1,4 @@
-// SLEAP's files, read as tables of labels. They name frames by number unless the "video" is a list of
+// Reads SLEAP's files as tables of labels. They name frames by number unless the "video" is a list of
 // pictures.
 #pragma once
 
@@ -10,26 +10,28 @@
 
 namespace q3d::loaders::formats {
 
-// A project or its predictions (.slp): labels made by hand, and predictions where nobody corrected them.
+// Reads a project or its predictions (.slp): labels made by hand, and predictions that nobody has corrected.
 // Returns nothing if the file is no .slp. Throws std::runtime_error that names the place, what was found and
 // what was expected. The frames of several videos are told apart by the names of the videos, so it refuses
 // videos of one name, and labels of several skeletons.
 std::optional<LabelTable> read_sleap_labels(const ForeignHdf5& file);
 
-// An exported analysis (.h5): one video, a row for each of its frames that has an animal. Returns nothing if
-// the file is no such export. Throws like read_sleap_labels.
+// Reads an exported analysis (.h5) of one video. The table has a row for each frame with an animal. Returns
+// nothing if the file is no such export. Throws like read_sleap_labels.
 std::optional<LabelTable> read_sleap_analysis(const ForeignHdf5& file);
 
-// The same as .csv: its first line is "track,frame_idx,instance.score,nose.x,nose.y,nose.score,...".
+// Returns whether the text is such an analysis as CSV. Its first line is
+// "track,frame_idx,instance.score,nose.x,nose.y,nose.score,...".
 bool is_sleap_csv(const std::string& text);
-// Throws std::runtime_error that names `where` and the line, what was found and what was expected.
+// Reads such a CSV. Throws std::runtime_error that names `where` and the line, what was found and what was
+// expected.
 LabelTable read_sleap_csv(const std::string& text, const std::string& where);
 
 // Collects animals frame by frame into a table, in which each track is an individual. Animals without a
 // track, and a second animal of the same track in a frame, are numbered within their frame ("animal_0").
 class SleapTable {
  public:
-  // `tracks` are the tracks' names; several of one name are told apart by their number.
+  // `tracks` are the tracks' names. Tracks with the same name are distinguished by their number.
   SleapTable(std::vector<std::string> nodes, const std::vector<std::string>& tracks);
 
   // `video` is an index into the videos that finish() is given.
@@ -64,7 +66,7 @@ class SleapTable {
   std::vector<Frame> rows_;
   std::vector<std::string> individuals_;
   std::vector<Animal> animals_;
-  std::vector<std::size_t> in_frame_;  // individuals of the present frame
+  std::vector<std::size_t> in_frame_;  // individuals of the current frame
 };
 
 }  // namespace q3d::loaders::formats

@@ -1,4 +1,4 @@
-// SLEAP's analysis export (HDF5), of one video:
+// Reads SLEAP's analysis export (HDF5) of one video:
 //
 //   tracks        (tracks, 2, nodes, frames) px, NaN where there is nothing. sleap-io also writes
 //                 (frames, tracks, nodes, 2); its attribute "dims" names the dimensions.
@@ -43,7 +43,8 @@ Layout layout_of(const std::vector<std::uint64_t>& extents, const std::vector<st
   return layout;
 }
 
-// The order that the attribute "dims" states, a JSON list of names; empty without a usable one.
+// Returns the order of dimensions that the attribute "dims" states, which is a JSON list of names. Empty if
+// there is no usable one.
 std::vector<std::size_t> stated_order(const ForeignHdf5& file) {
   const auto dims = file.text_attribute("tracks", "dims");
   if (!dims) return {};
@@ -78,7 +79,8 @@ std::vector<std::size_t> order_of_tracks(const ForeignHdf5& file, const std::vec
                   fmt::join(extents, ", "), nodes, nodes));
 }
 
-// The scores, in the order of the tracks without the dimension of x and y; empty if the file has none.
+// Returns the scores, in the order of the tracks but without the dimension of x and y. Empty if the file has
+// none.
 std::vector<double> read_scores(const ForeignHdf5& file, const Layout& tracks,
                                 const std::vector<std::size_t>& order, Layout& layout) {
   if (!file.has_dataset("point_scores")) return {};

@@ -1,5 +1,6 @@
-// SLEAP's analysis export as CSV: a line for each animal in each frame, "track,frame_idx,instance.score," and
-// then x, y and score of every node, as "nose.x,nose.y,nose.score". Other columns are ignored.
+// Reads SLEAP's analysis export as CSV. It has a line for each animal in each frame,
+// "track,frame_idx,instance.score," and then x, y and score of every node, as "nose.x,nose.y,nose.score".
+// Other columns are ignored.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -49,7 +50,7 @@ struct Row {
   std::vector<SleapTable::Point> points;
 };
 
-// sleap-io writes the frames of all videos into one table.
+// Throws if the table has frames of several videos, which sleap-io writes into one table.
 void require_one_video(const CsvTableReader& lines, const std::string& here, std::string& video) {
   if (video.empty()) video = here;
   if (here == video) return;

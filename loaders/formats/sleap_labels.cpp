@@ -1,4 +1,4 @@
-// SLEAP's .slp (HDF5):
+// Reads SLEAP's .slp (HDF5):
 //
 //   metadata.attrs["json"]       skeletons, and the nodes that they point into
 //   metadata.attrs["format_id"]  below 1.1, the corner of a picture is (0, 0), later the centre of its first
@@ -80,7 +80,7 @@ std::vector<std::string> track_names(const ForeignHdf5& file) {
 
 struct Video {
   LabelVideo facts;
-  std::vector<std::string> pictures{};  // of a video that is a list of pictures
+  std::vector<std::string> pictures{};  // names, if the video is a list of pictures
 };
 
 // Returns the pictures' names of a video that is a list of pictures; empty for any other video.
@@ -121,7 +121,7 @@ Video video_of(const std::string& text) {
   return video;
 }
 
-// The columns of the tables.
+// The columns of the tables that are read.
 struct Columns {
   std::vector<double> video, frame, first_instance, end_instance;
   std::vector<double> type, skeleton, track, from_predicted, first_point, end_point;
@@ -208,8 +208,8 @@ class LabelsReader {
     return {static_cast<std::size_t>(first), static_cast<std::size_t>(end)};
   }
 
-  // The videos that frames are of, in the order of their numbers. The frames of several videos have the same
-  // numbers, so the videos' names must tell them apart.
+  // Returns the videos that have frames, in the order of their numbers. Frames of different videos share
+  // numbers, so the videos must have different names.
   std::vector<Video> used_videos() {
     const std::vector<std::string> texts = file_.texts("videos_json");
     used_ = {columns_.video.begin(), columns_.video.end()};
@@ -228,7 +228,7 @@ class LabelsReader {
            "the same numbers; export each video's analysis as a file of its own");
   }
 
-  // The place of a video among those that are used.
+  // Returns the position of a video among the used ones.
   std::size_t place_of_video(double number) const {
     return static_cast<std::size_t>(std::distance(used_.begin(), used_.find(number)));
   }
@@ -243,8 +243,8 @@ class LabelsReader {
 
   bool is_predicted(std::size_t instance) const { return columns_.type[instance] == 1.0; }
 
-  // True for a prediction that somebody has corrected: a label made by hand in the same frame was made from
-  // it, or has its track.
+  // Returns whether somebody has corrected this prediction: a label made by hand in the same frame was made
+  // from it, or has its track.
   bool is_replaced(std::size_t instance, std::size_t first, std::size_t end) const {
     if (!is_predicted(instance)) return false;
     for (std::size_t other = first; other < end; ++other) {
@@ -290,7 +290,7 @@ class LabelsReader {
   Points by_hand_;
   Points predicted_;
   std::vector<std::string> nodes_;
-  std::set<double> used_;  // numbers of the videos that frames are of
+  std::set<double> used_;  // numbers of the videos that have frames
 };
 
 }  // namespace

@@ -11,13 +11,14 @@
 namespace q3d::loaders::formats {
 namespace {
 
-// A table has a column for each individual in every row. Beyond this many tracks, which trackers make of a
-// long video by losing and finding animals, individuals are numbered within their frame instead.
+// A table has columns for every individual. With more tracks than this, individuals are numbered within their
+// frame instead. Trackers make many tracks of a long video, because they lose animals and find them again.
 constexpr std::size_t kMostTracks = 64;
-// x, y and likelihood of every node of every individual of every frame.
+// The largest size of a table: x, y and likelihood of every node of every individual of every frame.
 constexpr std::size_t kMostNumbers = std::size_t{1} << 28U;
 
-// The name becomes a part of sample ids, and DeepLabCut's tables keep the word "single" for no animal.
+// Returns the name of an individual. It becomes part of sample ids, and it must not be "single", with which
+// DeepLabCut's tables mean no animal.
 std::string individual_name(std::string name, std::size_t track, bool is_shared) {
   std::replace_if(
       name.begin(), name.end(), [](unsigned char c) { return c < 0x20 || c == '/' || c == '#' || c == '\\'; },
@@ -85,7 +86,7 @@ LabelTable SleapTable::finish(bool rows_are_numbers, std::vector<LabelVideo> vid
   }
   std::vector<std::size_t> row_of_frame(rows_.size(), 0);
   for (const Animal& animal : animals_) {
-    // Animals come in the order of their frames.
+    // The animals are in the order of their frames.
     const bool is_new = &animal == animals_.data() || (&animal - 1)->row != animal.row;
     if (is_new) table.rows.push_back(rows_[animal.row].name);
     if (is_new && !table.videos.empty()) table.video_of_row.push_back(rows_[animal.row].video);

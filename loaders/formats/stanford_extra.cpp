@@ -1,4 +1,4 @@
-// StanfordExtra: a list of dogs, [{img_path, img_width, img_height, img_bbox, joints, ...}, ...], whose
+// Loads StanfordExtra, a list of dogs, [{img_path, img_width, img_height, img_bbox, joints, ...}, ...], whose
 // pictures are those of Stanford Dogs. Version 12 has 24 joints; its first release has the first 20 of them.
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-// SuperAnimal-Quadruped80K: COCO with 39 keypoints, pictures of eight sub-datasets.
+// Loads SuperAnimal-Quadruped80K: COCO with 39 keypoints and pictures of eight sub-datasets.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -12,10 +12,10 @@ namespace {
 
 using manifests::SampleRecord;
 
-// These sub-datasets put "neck" at the shoulder end; SuperAnimal files it under neck_base, which is the head
-// end (and the 26's neck). Such a point would teach the wrong place, so its weight is 0; v stays as it was.
+// These sub-datasets put "neck" at the shoulder end; SuperAnimal stores it as neck_base, which is the head
+// end (and the neck of the 26). Such a point would teach the wrong place, so its weight is 0; v is unchanged.
 constexpr std::array<std::string_view, 4> kNeckAtTheShoulders{"ap10k", "apt36k", "cheetah", "acinoset"};
-constexpr std::size_t kNeck = 18;  // of Animal3D's 26
+constexpr std::size_t kNeck = 18;  // index among Animal3D's 26
 
 bool has_neck_at_the_shoulders(std::string_view source) {
   return std::find(kNeckAtTheShoulders.begin(), kNeckAtTheShoulders.end(),

@@ -1,4 +1,4 @@
-// Confidences, which pose estimators write in the place of v.
+// Handles confidences, which pose estimators write instead of v.
 #pragma once
 
 #include <cstddef>

@@ -65,7 +65,7 @@ class Guesser {
     });
   }
 
-  // The name among the 26 without its side, for parts of legs; empty if there is none.
+  // Returns the name among the 26, without its side, for parts of legs; empty if there is none.
   std::string leg_target(const KeypointWords& words) {
     const bool is_front = words.end == End::front;
     switch (words.part) {
@@ -90,7 +90,7 @@ class Guesser {
     }
   }
 
-  // The end of the body, from the part where the name does not say it.
+  // Returns the end of the body (front or back). If the name does not say it, it follows from the part.
   static End end_of(const KeypointWords& words) {
     if (words.end != End::none) return words.end;
     switch (words.part) {
@@ -166,7 +166,7 @@ class Guesser {
     source = static_cast<int>(i);
   }
 
-  // Doubts about a part that different sets place differently.
+  // Adds a doubt about a part that different datasets place differently.
   void remark(std::size_t i, const KeypointWords& words, const std::string& target) {
     const auto doubt = [&](const std::string& text) {
       doubts_.push_back(fmt::format("\"{}\" -> {}: {}", name(i), target, text));
@@ -195,7 +195,8 @@ class Guesser {
     }
   }
 
-  // A keypoint of the 26 maps together with its mirror image, or alone if only one side is labelled.
+  // Drops a mapped keypoint of the 26 whose mirror image is labelled but not mapped. If only one side is
+  // labelled, it may map alone.
   void drop_lone_sides() {
     const Topology& animal3d = topology("animal3d26");
     for (std::size_t i = 0; i < topology_.source.size(); ++i) {
@@ -253,7 +254,7 @@ nlohmann::ordered_json topology_json(const Topology& topology_given, const std::
     const int other = given.flip[static_cast<std::size_t>(i)];
     if (other == i) continue;
     const bool is_left = words_of(name(i)).side != Side::right;
-    // Each pair once, left first where the names say which is left.
+    // Write each pair once, left first if the names say which one is left.
     const bool is_first = words_of(name(i)).side == words_of(name(other)).side ? i < other : is_left;
     if (is_first) file["flip_pairs"].push_back({name(i), name(other)});
   }

@@ -17,10 +17,10 @@ struct TopologyGuess {
   std::vector<std::string> doubts;  // a sentence for each thing that a person should look at
 };
 
-// Guesses mirror images and the map to the 26 from names in English. A name maps to one of the 26 only if
-// side and end of the body are said where the 26 part them, and if its mirror image maps as well. What is not
-// sure is left out, or is listed among the doubts. Throws std::invalid_argument if there are no names, or if
-// one occurs twice.
+// Guesses mirror images and the map to the 26 from names in English. A name maps to one of the 26 only if it
+// states side and end of the body where the 26 distinguish them, and if its mirror image maps as well.
+// Uncertain keypoints are left out or listed among the doubts. Throws std::invalid_argument if there are no
+// names, or if one occurs twice.
 TopologyGuess guess_topology(const std::string& name, std::span<const std::string> names);
 
 // Returns the topology in the form of a topology file (topology_file.h).

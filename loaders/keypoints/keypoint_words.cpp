@@ -31,7 +31,7 @@ constexpr std::array<std::pair<std::string_view, End>, 10> kEnds{{{"front", End:
                                                                   {"h", End::back},
                                                                   {"b", End::back}}};
 
-// Names of parts, joined without separators. The longest that fits is taken.
+// The names of parts, without separators. The longest name that fits is taken.
 constexpr auto kParts = std::to_array<std::pair<std::string_view, Part>>({
     {"eye", Part::eye},
     {"ear", Part::ear},
@@ -116,7 +116,8 @@ constexpr auto kParts = std::to_array<std::pair<std::string_view, Part>>({
     {"endoftail", Part::tail_tip},
 });
 
-// Parts "leftFrontPaw", "left_front_paw" and "L-F Paw" into lower-case words, and digits from letters.
+// Splits "leftFrontPaw", "left_front_paw" and "L-F Paw" into lower-case words, and separates digits from
+// letters.
 Words parted(std::string_view name) {
   Words words;
   char before = '_';
@@ -153,10 +154,10 @@ const typename Table::value_type* entry(const Table& table, std::string_view wor
   return found == table.end() ? nullptr : &*found;
 }
 
-// Takes words for side and end off the beginning of a word that goes on with a part: "nearfrontfoot", and
-// both letters of "fl". Puts what it takes into `words`.
+// Splits words for side and end off the beginning of a word: "nearfrontfoot", and both letters of "fl".
+// Appends all words to `words`.
 void split_glued(std::string word, Words& words) {
-  constexpr std::size_t kLeast = 3;  // shorter words for side and end are not looked for within a word
+  constexpr std::size_t kLeast = 3;  // shorter words for side and end are not searched for within a word
   const bool is_pair =
       word.size() == 2 &&
       ((entry(kSides, word.substr(0, 1)) != nullptr && entry(kEnds, word.substr(1)) != nullptr) ||
@@ -181,7 +182,8 @@ void split_glued(std::string word, Words& words) {
   words.push_back(std::move(word));
 }
 
-// The part that all words without side and end name together, else the longest run of them that names one.
+// Returns the part that all words except those for side and end name together, or else the part that the
+// longest run of them names.
 Part part_of(const Words& words) {
   for (std::size_t length = words.size(); length > 0; --length) {
     for (std::size_t first = 0; first + length <= words.size(); ++first) {

@@ -39,8 +39,8 @@ struct KeypointWords {
   Side side = Side::none;
   End end = End::none;
   Part part = Part::none;
-  // The name in lower case without the words for its side, parts joined by '_'. A keypoint and its mirror
-  // image have the same.
+  // The name in lower case without the words for its side, joined by '_'. A keypoint and its mirror image
+  // have the same one.
   std::string without_side;
 };
 

@@ -1,4 +1,4 @@
-// Mirrors labels left to right, for a photograph that is mirrored.
+// Mirrors labels from left to right when a photograph is mirrored.
 //
 // This is not part of the official code, whose own flip crashes and is off. Left and right of the body are
 // the two sides of its plane z = 0. A body whose template and shape space are symmetric about this plane has

@@ -10,7 +10,7 @@
 namespace q3d::loaders::keypoints {
 
 struct NameMatch {
-  std::vector<int> places;  // of each keypoint of the topology in the file's list; -1 if it is missing
+  std::vector<int> places;           // of the topology's keypoints: index in the file's list, or -1
   std::vector<std::string> missing;  // names of the topology that the file lacks
   std::vector<std::string> unknown;  // names of the file that the topology lacks
 

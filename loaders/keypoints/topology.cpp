@@ -21,7 +21,7 @@ std::vector<std::string> words(const std::string& text) {
   return {std::istream_iterator<std::string>(stream), {}};
 }
 
-// `sources` names, for each Animal3D keypoint in turn, the keypoint it is taken from; "-" is none.
+// `sources` names, for each Animal3D keypoint in turn, the keypoint from which it is taken; "-" means none.
 Topology make(const std::string& name, const std::string& keypoints, const Pairs& mirrored,
               const std::string& sources) {
   Topology made{.name = name, .keypoints = words(keypoints), .flip = {}, .weights = {}};

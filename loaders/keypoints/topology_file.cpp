@@ -21,7 +21,7 @@ using nlohmann::json;
 
 constexpr std::array<std::string_view, 6> kKeys{"name",       "about",      "keypoints",
                                                 "flip_pairs", "animal3d26", "weights"};
-constexpr std::size_t kMaxKeypoints = 1000;  // what is larger is no list of an animal's keypoints
+constexpr std::size_t kMaxKeypoints = 1000;  // a longer list is no list of an animal's keypoints
 
 class Reader {
  public:

@@ -17,10 +17,10 @@ namespace q3d::loaders::pictures {
 struct AugmentOptions {        // the official configuration's values
   double scale = 0.3;          // box side times 1 +- this
   double rotation_deg = 30.0;  // standard deviation, cut at two of them
-  double rotation_rate = 0.6;  // share of samples that are rotated
+  double rotation_rate = 0.6;  // fraction of samples that are rotated
   double shift = 0.02;         // share of the box side, for each axis
   double colour = 0.2;         // each channel times 1 +- this
-  double mirror_rate = 0.0;    // share of samples that are mirrored left to right
+  double mirror_rate = 0.0;    // fraction of samples that are mirrored left to right
 };
 
 struct Augmentation {

@@ -1,4 +1,4 @@
-// Boxes of annotation files: which of two conventions a file uses, and when a box cannot be used.
+// Finds out which of two conventions the boxes of an annotation file follow, and which boxes cannot be used.
 #pragma once
 
 #include <optional>

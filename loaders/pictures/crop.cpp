@@ -66,7 +66,7 @@ Affine patch_from_image(const SquareBox& box, int patch_side_px, double scale, d
   const auto half_patch = static_cast<float>(patch_side_px * 0.5);
   const cv::Point2f down = rotated(0.0F, half_source, angle_rad);
   const cv::Point2f right = rotated(half_source, 0.0F, angle_rad);
-  // Three points (centre, below it, right of it) of the image and of the patch, rounded to float32.
+  // Take three points (centre, below it, right of it) of the image and of the patch, rounded to float32.
   const auto image_point = [&](const cv::Point2f& offset) {
     return cv::Point2f(static_cast<float>(box.center_x_px + offset.x),
                        static_cast<float>(box.center_y_px + offset.y));

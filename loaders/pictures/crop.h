@@ -29,8 +29,8 @@ struct SquareBox {  // pixels of the source image
 // max(w, h), at least 1.
 SquareBox square_box(const manifests::Box& box);
 
-// Returns the square box of the official EvaluationDataset. It is the same, except that the side is computed
-// in float32 as w / 200 * 200, which changes the last bit of some sides (424 becomes 423.99997).
+// Returns the square box of the official EvaluationDataset. It equals square_box(), except that the side is
+// computed in float32 as w / 200 * 200, which changes the last bit of some sides (424 becomes 423.99997).
 SquareBox evaluation_box(const manifests::Box& box);
 
 // Returns the map from image px to patch px. Official code: gen_trans_from_patch_cv (rotation in degrees).
@@ -66,8 +66,8 @@ void normalise_patch(const cv::Mat& patch_rgb, const std::array<double, 3>& colo
                      std::span<float> planes);
 
 // Maps keypoints of the source image to crop units [-0.5, 0.5]: the affine map is computed in double, stored
-// as float32 px, and then / 256 - 0.5 is computed in float32. Unlabelled points are mapped too, so ask
-// is_visible().
+// as float32 px, and then / 256 - 0.5 is computed in float32. Unlabelled points are mapped too, so check
+// is_visible() before using a point.
 smal::CropKeypoints keypoints_to_crop(const manifests::Keypoints& keypoints, const Affine& patch_from_image);
 
 }  // namespace q3d::loaders::pictures

@@ -12,7 +12,8 @@
 namespace q3d::loaders::pictures {
 namespace {
 
-// skimage.filters.gaussian: kernel cut at four sigma, edges repeated, double precision.
+// Blurs like skimage.filters.gaussian: in double precision, with the kernel cut at four sigma and edges
+// repeated.
 cv::Mat blurred(const cv::Mat& rgb, double sigma) {
   const int radius = static_cast<int>(4.0 * sigma + 0.5);
   cv::Mat kernel(2 * radius + 1, 1, CV_64F);
@@ -24,7 +25,8 @@ cv::Mat blurred(const cv::Mat& rgb, double sigma) {
   return result;
 }
 
-// The longer side once a box of w x h px is widened to the aspect (official code: expand_to_aspect_ratio).
+// Returns the longer side after a box of w x h px was widened to the aspect. Official code:
+// expand_to_aspect_ratio.
 float longer_side(float w, float h, const std::array<int, 2>& aspect) {
   if (aspect[0] <= 0 || aspect[1] <= 0) return std::max(w, h);
   const double ratio = static_cast<double>(aspect[1]) / aspect[0];

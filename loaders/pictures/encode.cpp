@@ -17,7 +17,7 @@ namespace {
 
 std::vector<std::byte> encode(const cv::Mat& picture, const char* extension,
                               const std::vector<int>& parameters) {
-  cv::Mat bgr;  // not a second header of `picture`: cvtColor would turn the caller's pixels
+  cv::Mat bgr;  // needs memory of its own: cvtColor in place would change the caller's pixels
   if (picture.channels() == 3) {
     cv::cvtColor(picture, bgr, cv::COLOR_RGB2BGR);
   } else {
@@ -32,7 +32,8 @@ std::vector<std::byte> encode(const cv::Mat& picture, const char* extension,
   return {view.begin(), view.end()};
 }
 
-// The pixels that lie below the patch, with the neighbours that the interpolation reads.
+// Returns the region of source pixels that the patch covers, with the neighbours that the interpolation
+// reads.
 cv::Rect source_of_patch(const Affine& patch_from_crop) {
   constexpr double kLast = kPatchSidePx - 1.0;
   constexpr int kNeighboursPx = 2;

@@ -28,8 +28,8 @@ struct StoredRegion {
 };
 
 // Decodes the part of a stored RGB crop that warp_patch needs for this map from crop px to patch px, or more.
-// A JPEG is not decoded beyond it, which saves most of the time: a crop has 1.9 times the box's side. Throws
-// as decode_stored does.
+// A JPEG is decoded only that far, which saves most of the time, because a crop's side is 1.9 times the
+// box's. Throws as decode_stored does.
 StoredRegion decode_stored_for(std::span<const std::byte> bytes, const Affine& patch_from_crop);
 
 }  // namespace q3d::loaders::pictures

@@ -53,7 +53,7 @@ DecodedImage unreadable(std::span<const std::byte> bytes) {
           fmt::format("got {} bytes that start with{}, expected JPEG or PNG content", bytes.size(), start)};
 }
 
-// PIL's convert('L') of RGB: ITU-R 601-2 luma in 16-bit fixed point.
+// Computes PIL's convert('L') of RGB: ITU-R 601-2 luma in 16-bit fixed point.
 cv::Mat luma(const cv::Mat& rgb) {
   cv::Mat grey(rgb.size(), CV_8UC1);
   for (int y = 0; y < rgb.rows; ++y) {

@@ -39,14 +39,14 @@ struct DecodedImage {
 
 // Decodes a picture. Grey, palette, alpha, 16-bit and CMYK pictures become 8-bit RGB as with PIL's
 // convert('RGB'): alpha is dropped, and CMYK is read as Adobe's inverted kind. There is one difference: of
-// 16-bit grey the high byte is kept, where PIL clips at 255 and gives a white picture. A bad
-// picture is a failure and never throws. Throws std::bad_alloc if memory runs out. Where it reads the file
-// itself, it also throws as read_picture_file does.
+// 16-bit grey the high byte is kept, where PIL clips at 255 and gives a white picture. A bad picture is a
+// failure and never throws. Throws std::bad_alloc if memory runs out. The overload that takes a path also
+// throws as read_picture_file does.
 DecodedImage decode_image(std::span<const std::byte> bytes);
 DecodedImage decode_image(const std::filesystem::path& path);
 
-// The kind of a mask file. The official code takes every file for a silhouette, but some converters name the
-// picture itself as its mask, or write 0 and 1.
+// The kind of content of a mask file. The official code takes every file for a silhouette, but some
+// converters name the picture itself as its mask, or write 0 and 1.
 enum class MaskKind : std::uint8_t {
   absent,      // no mask is named
   silhouette,  // has dark and bright pixels, as a mask should

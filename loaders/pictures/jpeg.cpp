@@ -77,7 +77,7 @@ void read_rows(Decoder& decoder) {
   jpeg_finish_decompress(&decoder.info);
 }
 
-// libjpeg widens the region to whole blocks on its left.
+// Starts the region. libjpeg widens it to whole blocks on its left.
 void begin_region(Decoder& decoder) {
   jpeg_start_decompress(&decoder.info);
   auto left = static_cast<JDIMENSION>(decoder.region.x);
@@ -106,7 +106,7 @@ bool run(Decoder& decoder, void (*step)(Decoder&)) {
 }
 
 DecodedImage failed(const Decoder& decoder) {
-  if (decoder.errors.msg_code == JERR_OUT_OF_MEMORY) throw std::bad_alloc();  // no fault of the picture
+  if (decoder.errors.msg_code == JERR_OUT_OF_MEMORY) throw std::bad_alloc();  // not the picture's fault
   if (decoder.ended_early) return {{}, Reason::image_truncated, "the JPEG data end before the picture does"};
   if (decoder.too_many_scans) {
     return {{}, Reason::image_too_large, fmt::format("got a JPEG with more than {} scans", kMaxScans)};
@@ -133,7 +133,7 @@ cv::Mat rgb_from_inverted_cmyk(const cv::Mat& cmyk) {
   return rgb;
 }
 
-// Reads the header and chooses the colours -> the failure, if there is one.
+// Reads the header and chooses the colour space. Returns the failure, if there is one.
 std::optional<DecodedImage> begin(Decoder& decoder) {
   if (!run(decoder, read_header)) return failed(decoder);
   const auto width = static_cast<std::int64_t>(decoder.info.image_width);
@@ -170,7 +170,7 @@ DecodedImage decode_with(Decoder& decoder) {
 
 DecodedRegion decode_region_with(Decoder& decoder, const cv::Rect& wanted) {
   if (auto failure = begin(decoder)) return {*failure, {}};
-  // Colours are stored in half the resolution: a pixel's depend on those of its neighbours, which libjpeg
+  // Colours are stored at half the resolution, so a pixel's colour depends on its neighbours, which libjpeg
   // does not know beyond the edge of a region.
   constexpr int kNeighboursPx = 4;
   const cv::Rect all(0, 0, static_cast<int>(decoder.info.image_width),
@@ -185,7 +185,7 @@ DecodedRegion decode_region_with(Decoder& decoder, const cv::Rect& wanted) {
   return {finished(decoder, pixels), decoder.region.tl()};
 }
 
-// Calls decode(decoder) between the making and the end of a decoder.
+// Creates a decoder, calls decode(decoder) and destroys the decoder.
 template <typename Decode>
 auto with_decoder(std::span<const std::byte> bytes, Decode&& decode) {
   Decoder decoder;

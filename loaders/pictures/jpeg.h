@@ -17,15 +17,15 @@ bool is_jpeg(std::span<const std::byte> bytes);
 // std::bad_alloc, or cv::Exception with StsNoMem, if memory runs out.
 DecodedImage decode_jpeg(std::span<const std::byte> bytes);
 
-// A part of a picture, and where its first pixel lies in the picture.
+// A part of a picture and the position of its first pixel in the picture.
 struct DecodedRegion {
   DecodedImage image;
   cv::Point origin;
 };
 
-// Decodes a part that covers `wanted`, as far as this lies in the picture: at least one pixel. Within it, the
-// pixels are those of decode_jpeg. Only the compressed data up to its last row are read, so that a picture
-// that ends later than that is not noticed. Throws as decode_jpeg does.
+// Decodes a part that covers `wanted` as far as it lies inside the picture, and at least one pixel. Within
+// this part, the pixels are those of decode_jpeg. Only the compressed data up to its last row are read, so
+// that a picture that ends later than that is not noticed. Throws as decode_jpeg does.
 DecodedRegion decode_jpeg_region(std::span<const std::byte> bytes, const cv::Rect& wanted);
 
 }  // namespace q3d::loaders::pictures

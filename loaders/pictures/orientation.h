@@ -1,4 +1,4 @@
-// EXIF orientations: how a viewer turns the stored pixels before it shows them.
+// An EXIF orientation says how a viewer turns the stored pixels before it shows them.
 #pragma once
 
 #include <opencv2/core.hpp>

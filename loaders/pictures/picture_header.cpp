@@ -16,7 +16,7 @@ namespace {
 
 using namespace std::string_view_literals;
 
-// Fills `bytes` from a position. Returns false if the file ends before.
+// Fills `bytes` from position `at` on. Returns false if the file ends earlier.
 using ReadAt = std::function<bool(std::uint64_t at, std::span<std::byte> bytes)>;
 
 constexpr std::string_view kPngSignature = "\x89PNG\r\n\x1a\n"sv;
@@ -88,7 +88,7 @@ std::optional<PictureHeader> read_jpeg_header(const ReadAt& read_at) {
     std::array<std::byte, 4> marker{};
     if (!read_at(at, marker) || marker[0] != std::byte{0xff}) return std::nullopt;
     const auto kind = std::to_integer<unsigned>(marker[1]);
-    if (kind == 0xff) {  // a byte that fills
+    if (kind == 0xff) {  // a fill byte
       ++at;
       continue;
     }
@@ -98,15 +98,15 @@ std::optional<PictureHeader> read_jpeg_header(const ReadAt& read_at) {
       at += 2;
       continue;
     }
-    // The end of the image, or the start of a scan.
+    // The next marker is the end of the image or the start of a scan.
     const bool are_pixels_next = kind == 0xd9 || kind == 0xda;
     if (are_pixels_next) return std::nullopt;
     const std::uint32_t length = big_endian(std::span(marker).subspan(2));
     if (length < 2) return std::nullopt;
-    // The 13 kinds of frames. The gaps between their numbers are DHT, JPG and DAC.
+    // There are 13 kinds of frames. The gaps between their numbers are DHT, JPG and DAC.
     const bool is_frame = kind >= 0xc0 && kind <= 0xcf && kind != 0xc4 && kind != 0xc8 && kind != 0xcc;
     if (is_frame) {
-      std::array<std::byte, 5> frame{};  // bits of a sample, height, width
+      std::array<std::byte, 5> frame{};  // bits per sample, height, width
       if (!read_at(at + 4, frame)) return std::nullopt;
       return with_size(header, big_endian(std::span(frame).subspan(3, 2)),
                        big_endian(std::span(frame).subspan(1, 2)));
@@ -122,7 +122,7 @@ std::optional<PictureHeader> read_jpeg_header(const ReadAt& read_at) {
   return std::nullopt;
 }
 
-// Goes from chunk to chunk, up to the pixels.
+// Walks through the chunks up to the pixels.
 std::optional<PictureHeader> read_png_header(const ReadAt& read_at) {
   constexpr std::uint64_t kFrameBytes = 12;  // length, type and checksum
   std::optional<PictureHeader> header;

@@ -9,9 +9,9 @@
 namespace q3d::loaders::pictures {
 
 struct PictureHeader {
-  int width_px = 0;  // of the pixels as stored
+  int width_px = 0;  // width of the pixels as stored
   int height_px = 0;
-  int orientation = 1;  // EXIF's, 1 to 8; 1 (as stored) if there is none, or a damaged one
+  int orientation = 1;  // EXIF orientation, 1 to 8; 1 (as stored) if it is absent or damaged
 };
 
 // Reads the size and the EXIF orientation of a JPEG (APP1) or a PNG (eXIf). Returns nothing if the content is

@@ -28,7 +28,7 @@ std::uint32_t big_endian(const unsigned char* at) {
 
 struct Chunk {
   std::string_view type;
-  std::span<const unsigned char> whole;  // with its frame
+  std::span<const unsigned char> whole;  // the chunk with its length, type and checksum
   std::span<const unsigned char> data() const { return whole.subspan(8, whole.size() - kChunkFrame); }
   bool is_intact() const {
     const uLong sum = crc32(0, whole.data() + 4, static_cast<uInt>(whole.size() - 8));
@@ -48,7 +48,7 @@ DecodedImage damaged(std::string what) {
   return {{}, Reason::image_not_an_image, "damaged PNG: " + what};
 }
 
-// The chunks with pixels that were read so far.
+// The state of the pixel data chunks that were read so far.
 struct PixelChunks {
   std::vector<unsigned char> file{kSignature.begin(), kSignature.end()};
   bool has_header = false;
@@ -78,7 +78,7 @@ std::string add_chunk(const Chunk& chunk, PixelChunks& pixels) {
   } else if (chunk.type == "IEND") {
     if (!pixels.has_pixels) return "no pixels";
   } else {
-    return {};  // colour profile, EXIF, text: not taken
+    return {};  // colour profile, EXIF and text are dropped
   }
   pixels.file.insert(pixels.file.end(), chunk.whole.begin(), chunk.whole.end());
   return {};
@@ -91,7 +91,7 @@ DecodedImage decode_plain(const std::vector<unsigned char>& file) {
     cv::cvtColor(image, image, cv::COLOR_BGR2RGB);
     return {image, Reason::none, {}};
   } catch (const cv::Exception& error) {
-    if (error.code == cv::Error::StsNoMem) throw;  // no fault of the picture
+    if (error.code == cv::Error::StsNoMem) throw;  // this is not the picture's fault
     return damaged(error.err);
   }
 }

@@ -32,7 +32,7 @@ cv::Mat copied(const cv::Mat& image, const Region& region) {
   return crop;
 }
 
-// The source pixels below one target pixel along one axis, and how much of each it covers (in source px).
+// The source pixels that one target pixel covers along one axis, and how much of each (in source px).
 struct Span {
   int first = 0;
   std::vector<float> cover;  // empty where the target pixel lies outside the image
@@ -70,8 +70,8 @@ void add_row(const std::uint8_t* row, int channels, const std::vector<Span>& col
   }
 }
 
-// Averages over the area below each target pixel; pixels outside the image count as black. Unlike cv::resize
-// this needs no padded copy of the region, which for a large box could be many times the image.
+// Averages the source over the area of each target pixel; pixels outside the image count as black. Unlike
+// cv::resize this needs no padded copy of the region, which for a large box could be many times the image.
 cv::Mat reduced(const cv::Mat& image, const Region& region, int side_px) {
   const double step = static_cast<double>(region.side_px) / side_px;
   const std::vector<Span> columns = spans(region.left_px, step, side_px, image.cols);

@@ -8,8 +8,9 @@
 
 namespace q3d::loaders::pictures {
 
-// Covers all that augmentation can reach. A box that is enlarged 1.3 times and turned by 45 degrees spans 1.3
-// sqrt(2) sides, and its centre moves by up to 0.02 sides in each direction: 1.3 sqrt(2) + 2 * 0.02 = 1.88.
+// This scale covers everything that augmentation can reach. A box that is enlarged 1.3 times and turned by 45
+// degrees spans 1.3 sqrt(2) sides, and its centre moves by up to 0.02 sides in each direction: 1.3 sqrt(2) +
+// 2 * 0.02 = 1.88.
 inline constexpr double kStoredCropScale = 1.9;
 
 struct StoredCrop {

@@ -1,5 +1,5 @@
-// Species: how file names tell them, which of the five families of the SMAL shape space they belong to, and
-// which animals are not quadrupeds.
+// Finds the species in file names, the family of the SMAL shape space to which a species belongs, and animals
+// that are not quadrupeds.
 #pragma once
 
 #include <optional>

@@ -10,7 +10,7 @@
 
 namespace q3d::loaders::species::table {
 
-// Names as the four datasets, AP-10K (54 species) and ImageNet's classes use them.
+// The names are those of the four datasets, of AP-10K (54 species) and of ImageNet's classes.
 inline constexpr std::string_view kFelidae[] = {
     "bobcat", "caracal", "cat",    "cheetah", "cougar", "jaguar", "jaguarundi", "kitten", "leopard", "lion",
     "lynx",   "margay",  "ocelot", "panther", "puma",   "serval", "tabby",      "tiger",  "wildcat"};

@@ -12,7 +12,7 @@
 
 namespace q3d::model::ranks {
 
-// Backward passes that leave in every parameter the mean of all ranks' gradients.
+// Runs backward passes after which every parameter holds the mean of all ranks' gradients.
 class AveragedBackward {
  public:
   AveragedBackward() = default;
@@ -50,10 +50,10 @@ class Collective {
       const std::vector<torch::Tensor>& parameters) const = 0;
 };
 
-// A world of one rank, at no cost.
+// Returns a world of one rank, whose functions cost nothing.
 std::shared_ptr<const Collective> single_rank();
 
-// The mean of each number over the ranks.
+// Returns the mean of each number over the ranks.
 std::vector<double> mean_over_ranks(const Collective& ranks, const std::vector<double>& values);
 
 }  // namespace q3d::model::ranks

@@ -24,7 +24,7 @@ static_assert(TORCH_VERSION_MAJOR == 2 && TORCH_VERSION_MINOR == 11,
 
 using GroupPointer = c10::intrusive_ptr<c10d::ProcessGroup>;
 
-// Says which rank speaks, for all of them write to one terminal.
+// Adds the rank to the message of an error, because all ranks write to one terminal.
 template <typename Call>
 auto together(const RankPlace& place, Call&& call) {
   try {

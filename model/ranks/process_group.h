@@ -1,4 +1,4 @@
-// Several ranks over the network, by LibTorch's own c10d.
+// Connects several ranks over the network with LibTorch's own c10d.
 #pragma once
 
 #include <torch/types.h>

@@ -1,4 +1,4 @@
-// Reads from the environment which rank the launcher has made of this process.
+// Reads from the environment which rank the launcher has given to this process.
 #pragma once
 
 #include <chrono>
@@ -26,8 +26,8 @@ struct RankPlace {
 // std::invalid_argument naming the variable, got and expected.
 RankPlace rank_place_from_environment();
 
-// How many cores of this machine are the rank's own, at least 1. A launcher that binds its ranks to cores, as
-// srun does, has divided them already; else the ranks of a machine get equal shares.
+// Returns how many cores of this machine belong to the rank, at least 1. A launcher that binds its ranks to
+// cores, as srun does, has already divided them; otherwise the ranks of a machine get equal shares.
 int own_cores(const RankPlace& place);
 
 }  // namespace q3d::model::ranks

@@ -5,7 +5,7 @@
 namespace q3d::model::ranks {
 namespace {
 
-// Says who asked whom, for all ranks write to one terminal.
+// Adds the rank and the store to the message of an error, because all ranks write to one terminal.
 template <typename Question>
 auto asked(const RankPlace& place, Question&& question) {
   try {

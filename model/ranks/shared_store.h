@@ -1,4 +1,4 @@
-// Words that all ranks of a run can read and write, wherever they run.
+// A store of short texts that all ranks of a run can read and write, on any machine.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@
 
 namespace q3d::model::ranks {
 
-// The store does not answer: the process that holds it has ended, or cannot be reached.
+// Says that the store does not answer, because the process that holds it has ended or cannot be reached.
 class StoreLost : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

@@ -116,7 +116,8 @@ std::optional<std::int64_t> UnitClaims::next(std::int64_t units) {
   }
   const std::int64_t given = store_.add(kNext, 0);
   if (given >= units || (!is_idle && units - given <= ranks_)) return std::nullopt;
-  // Told before the counter moves, so that nobody takes the unit for finished in between.
+  // The other ranks are told before the counter moves, so that none of them takes the unit for finished in
+  // between.
   {
     const std::lock_guard lock(mutex_);
     is_claiming_ = true;
@@ -141,7 +142,7 @@ UnitClaims::Remainder UnitClaims::remainder() {
     copied.insert(copied.end(), word.copied.begin(), word.copied.end());
   }
   {
-    // This rank compares with its own times, since they tell how soon it would make the unit itself.
+    // This rank compares with its own times, because they show how fast it would make the unit itself.
     const std::lock_guard lock(mutex_);
     if (longest_.count() > 0.0) longest = longest_;
   }

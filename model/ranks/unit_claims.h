@@ -1,10 +1,10 @@
-// Which rank makes which unit of a run.
+// Decides which rank makes which unit of a run.
 //
 // A unit is given to the first rank that asks. Every rank keeps one word in the store: the units that it has
 // open, and a number that grows as long as it lives. When all units are given away, a rank without work reads
 // these words. It makes a unit of another rank once more when that rank has died, or has had the unit open
 // for far longer than its own units took. Two ranks that make one unit write the same bytes, so neither
-// disturbs the other, and a rank that is slow or dead holds nobody.
+// disturbs the other, and a slow or dead rank delays nobody.
 #pragma once
 
 #include <array>
@@ -65,17 +65,17 @@ class UnitClaims {
   // Says what other ranks still do, when next() gives nothing and this rank has no unit open.
   Remainder remainder();
 
-  // The unit's files and its journal lines are on disk.
+  // Call this when the unit's files and its journal lines are on disk.
   void finish(std::int64_t unit, const Tally& tally);
 
-  // This rank ends. What it has open is for the others to make.
+  // Says that this rank ends. The other ranks make the units that it has open.
   void leave();
-  // Whether another rank has left or died.
+  // Returns whether another rank has left or died.
   bool has_gone(int rank);
-  // Whether each of the other ranks has come and left.
+  // Returns whether each of the other ranks has joined and left.
   bool have_all_left();
 
-  // The sum of what the other ranks have told.
+  // Returns the sum of the numbers that the other ranks have told.
   Tally others();
 
  private:

@@ -1,4 +1,4 @@
-// The weights of the losses, and the form of them that is used.
+// The weights of the losses, and the variant of the losses.
 #pragma once
 
 #include <cstdint>
@@ -23,9 +23,9 @@ struct LossWeights {
   bool operator==(const LossWeights&) const = default;
 };
 
-// `official` repeats the released code to the bit of its gradients, which are NaN where a predicted joint is
-// not rotated at all, and lets samples without truth pose as real animals for the discriminator. `sound` has
-// neither.
+// `official` reproduces the gradients of the released code bit for bit. They are NaN if a predicted joint is
+// not rotated at all, and samples without truth count as real animals for the discriminator. `sound` avoids
+// both.
 enum class LossVariant : std::uint8_t { sound, official };
 
 std::string_view to_string(LossVariant variant);

@@ -2,8 +2,8 @@
 
 namespace q3d::pipeline::animal {
 
-// Chosen by eye from side views of house cats and lions, dogs and wolves, horses, cows and hippos, on one
-// scale: the trunks are about equally long.
+// The numbers were chosen by eye from side views of house cats and lions, dogs and wolves, horses, cows and
+// hippos. All are drawn to one scale, at which the trunks are about equally long.
 const std::array<Measure, kNumMeasures>& anatomy_measures() {
   using A = Anatomy;
   static constexpr std::array<Measure, kNumMeasures> kMeasures = {{

@@ -56,7 +56,7 @@ struct Anatomy {
 
 inline constexpr std::size_t kNumMeasures = sizeof(Anatomy) / sizeof(double);
 
-// One measure of all families and its spread among the individuals of one.
+// One measure for all families, and its spread among the individuals of one family.
 struct Measure {
   double Anatomy::*field;
   std::array<double, kNumFamilies> family_means;
@@ -64,10 +64,10 @@ struct Measure {
   bool is_angle;
 };
 
-// Every field of Anatomy once, in declaration order.
+// Returns every field of Anatomy once, in declaration order.
 const std::array<Measure, kNumMeasures>& anatomy_measures();
 
-// The mean animal of a family, 0 to 4.
+// Returns the mean animal of a family, which is a number from 0 to 4.
 Anatomy family_anatomy(std::size_t family);
 
 }  // namespace q3d::pipeline::animal

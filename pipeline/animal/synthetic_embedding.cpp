@@ -36,7 +36,7 @@ void place_body(const QuadrupedMesh& mesh, const BodyProfile& profile, Points& p
   }
 }
 
-// Angles around a tube at which the corners of its hole lie on the diagonals.
+// Returns angles around a tube at which the corners of its hole lie on the diagonals.
 std::vector<double> ring_angles(const Hole& hole) {
   std::vector<double> angles;
   for (int quarter = 0; quarter < 4; ++quarter) {
@@ -70,14 +70,14 @@ void place_tube(const QuadrupedMesh& mesh, const Tube& tube, const Anatomy& anat
   points.row(mesh.pole_of(tube.part)) = profile.pole;
 }
 
-// The reach of the seams, in edges. The seams of small tubes start part of the way, so that the tubes keep
+// The width of the smoothed seams, in edges. The seams of small tubes are narrower, so that the tubes keep
 // their shape.
 constexpr int kSeamReach = 4;
 int first_step(Part part) {
   return part == Part::right_foreleg || part == Part::right_hindleg ? 0 : 2;
 }
 
-// Steps over edges from the nearest border of a hole, at most kSeamReach.
+// Returns for each vertex the number of edges to the nearest border of a hole, at most kSeamReach.
 std::vector<int> steps_from_holes(const QuadrupedMesh& mesh) {
   std::vector<int> steps(mesh.vertices.size(), kSeamReach);
   std::deque<int> front;
@@ -123,7 +123,7 @@ void smooth_seams(const QuadrupedMesh& mesh, Points& points) {
   }
 }
 
-// The mirror image of the right half, exact to the last bit, and a middle at z = 0.
+// Makes the left half an exact mirror image of the right one, and moves the middle to z = 0.
 void mirror_right_half(const QuadrupedMesh& mesh, Points& points) {
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
     const auto here = static_cast<Eigen::Index>(v);

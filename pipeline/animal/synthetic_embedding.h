@@ -10,7 +10,8 @@ namespace q3d::pipeline::animal {
 
 using Points = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
 
-// (V, 3) model units, x to the head, y up, z to the right; an exact mirror image of itself in z = 0.
+// Returns the vertices, (V, 3) in model units: x points to the head, y up, z to the right. The animal is
+// exactly symmetric about z = 0.
 Points embed_quadruped(const QuadrupedMesh& mesh, const Anatomy& anatomy);
 
 }  // namespace q3d::pipeline::animal

@@ -49,7 +49,8 @@ class MeshBuilder {
       return hole.first_ring < ring && ring < hole.last_ring && hole.first_side < at && at < hole.last_side;
     };
     return std::any_of(kTubes.begin(), kTubes.end(), [&](const Tube& tube) {
-      // Sides right of the back, the same left of it as negative numbers, and the mirror image of both.
+      // A side may be counted to the right of the back, to the left as a negative number, or in the mirror
+      // image.
       return inside(tube.hole, side) || inside(tube.hole, side - kBodySides) || inside(tube.hole, -side) ||
              inside(tube.hole, kBodySides - side);
     });
@@ -114,7 +115,7 @@ class MeshBuilder {
     }
   }
 
-  // +1 right, 0 on the middle, -1 left.
+  // Returns 1 for a vertex on the right, 0 in the middle and -1 on the left.
   int half_of(int vertex) const {
     const auto v = static_cast<std::size_t>(vertex);
     if (mesh_.mirror[v] == vertex) return 0;
@@ -127,7 +128,7 @@ class MeshBuilder {
     return side < kBodySides / 2 ? 1 : -1;
   }
 
-  // Only the right half is joined; mirror_faces makes the other.
+  // Adds a face of the right half; mirror_faces makes the other half.
   void add_face(int a, int b, int c) {
     const auto on_right = [this](int vertex) { return mesh_.half[static_cast<std::size_t>(vertex)] >= 0; };
     if (on_right(a) && on_right(b) && on_right(c)) mesh_.faces.push_back({a, b, c});
@@ -151,7 +152,7 @@ class MeshBuilder {
     }
   }
 
-  // Is the quad that starts at (ring, side) of the right half part of a hole?
+  // Returns whether the quad that starts at (ring, side) of the right half is part of a hole.
   static bool covered(int ring, int side) {
     return std::any_of(kTubes.begin(), kTubes.end(), [&](const Tube& tube) {
       const Hole& hole = tube.hole;

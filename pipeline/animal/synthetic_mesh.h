@@ -1,4 +1,4 @@
-// The synthetic quadruped's mesh: which vertices there are and how they join, whatever the animal's shape.
+// The topology of the synthetic quadruped's mesh: its vertices and faces, which are the same for every shape.
 #pragma once
 
 #include <array>
@@ -8,7 +8,7 @@
 namespace q3d::pipeline::animal {
 
 // The body is one tube of rings from the rump to the nose; legs, tail, ears and jaw are tubes that grow out
-// of rectangular holes in it. Every tube ends in a pole. Rings are closed, so nothing else is open.
+// of rectangular holes in it. Every tube ends in a pole. Rings are closed, so the whole surface is closed.
 enum class Part {
   body,
   right_foreleg,
@@ -45,7 +45,7 @@ struct Tube {
   int rings;
 };
 
-// Right and middle tubes; the left ones are mirror images.
+// The tubes on the right and in the middle. The left ones are mirror images.
 inline constexpr std::array<Tube, 5> kTubes = {{
     {Part::right_foreleg, {26, 31, 9, 14}, 19},
     {Part::right_hindleg, {2, 9, 8, 13}, 19},
@@ -73,7 +73,7 @@ struct QuadrupedMesh {
   const std::vector<std::vector<int>>& rings_of(Part part) const {
     return rings[static_cast<std::size_t>(part)];
   }
-  // Any side, counted round the ring in either direction; -1 inside a hole.
+  // Returns the vertex of a ring's side, which may be counted in either direction. Returns -1 inside a hole.
   int body_vertex(int ring, int side) const {
     return rings_of(Part::body)[static_cast<std::size_t>(ring)]
                                [static_cast<std::size_t>((side + kBodySides) % kBodySides)];
@@ -81,17 +81,18 @@ struct QuadrupedMesh {
   int pole_of(Part part) const { return end_pole[static_cast<std::size_t>(part)]; }
 };
 
-// 3889 vertices and 7774 faces, closed, of genus 0, its own mirror image.
+// Returns the mesh. It has 3889 vertices and 7774 faces, is closed, of genus 0, and symmetric.
 QuadrupedMesh make_quadruped_mesh();
 
-// The part on the other side; middle parts are their own.
+// Returns the part on the other side. A part in the middle is its own mirror image.
 Part mirror_part(Part part);
 
-// The border of a hole as (ring, side) pairs of the body, in the order of the tube's ring; and its vertices.
+// Returns the border of a hole as (ring, side) pairs of the body, in the order of the tube's ring; the second
+// function returns its vertices.
 std::vector<std::array<int, 2>> hole_border(const Hole& hole);
 std::vector<int> border_vertices(const QuadrupedMesh& mesh, const Hole& hole);
 
-// The tube that a part is, or the mirror image of; the body is none.
+// Returns the tube of a part, or of its mirror image. The body has no tube.
 const Tube& tube_of(Part part);
 
 }  // namespace q3d::pipeline::animal

@@ -9,7 +9,7 @@ namespace {
 
 enum Axis { kRoll, kTurn, kPitch };
 
-// Left and middle joints; see synthetic_joints(). A left joint stands for both sides.
+// The left and middle joints of synthetic_joints(). A left joint stands for both sides.
 enum Joint {
   kSpine1 = 1,
   kSpine2,
@@ -38,15 +38,15 @@ enum Joint {
   kEar
 };
 
-// Distance from a left joint to its right twin, 0 for the middle.
+// Returns the index offset from a left joint to its right twin, or 0 for a joint in the middle.
 int twin_offset(int joint) {
   if (joint == kEar) return 1;
   const bool limb = (joint >= kShoulder && joint <= kForeFoot) || (joint >= kHip && joint <= kHindFoot);
   return limb ? 4 : 0;
 }
 
-// One angle of one joint: mean, independent spread and range. Ranges leave out what bones or neighbours
-// forbid: elbows and hocks fold forwards only, carpi and stifles backwards only.
+// One angle of one joint: mean, independent spread and range. The ranges exclude angles that the anatomy
+// forbids: elbows and hocks fold forwards only, carpi and stifles backwards only.
 struct Angle {
   Joint joint;
   Axis axis;
@@ -93,7 +93,7 @@ constexpr Angle kAngles[] = {
     {kEar, kRoll, 0, 0.12, -0.50, 0.50},         {kEar, kTurn, 0, 0.15, -0.60, 0.60},
     {kEar, kPitch, 0, 0.15, -0.60, 0.60}};
 
-// Twins move alike (mirror images), against each other, or there is none.
+// Twins move alike (as mirror images) or against each other, or the joint has no twin.
 enum Phase { kAlone, kAlike, kAgainst };
 
 struct Loading {
@@ -177,7 +177,7 @@ Eigen::Index component(int joint, Axis axis) {
   return 3 * joint + axis;
 }
 
-// A mirror image pitches alike and rolls and turns the other way.
+// Returns the angle of the mirror image, which has the same pitch and the opposite roll and turn.
 double mirrored(Axis axis, double angle) {
   return axis == kPitch ? angle : -angle;
 }
@@ -213,7 +213,7 @@ MotionModel synthetic_motion() {
 
 Eigen::VectorXd bounded_normals(Eigen::Index count, std::mt19937_64& random) {
   constexpr double kBound = 2.5;
-  // Box and Muller's transform: the standard library's own distribution differs between libraries.
+  // This is Box and Muller's transform, because std::normal_distribution differs between libraries.
   const auto uniform = [&random] { return (static_cast<double>(random() >> 11) + 0.5) * 0x1p-53; };
   Eigen::VectorXd numbers(count);
   for (Eigen::Index i = 0; i < count; ++i) {

@@ -23,7 +23,7 @@ struct MotionModel {
 
 MotionModel synthetic_motion();
 
-// Standard normal numbers, the same on every platform, none beyond 2.5.
+// Returns standard normal numbers within +-2.5, the same on every platform.
 Eigen::VectorXd bounded_normals(Eigen::Index count, std::mt19937_64& random);
 
 Eigen::VectorXd sample_motion(const MotionModel& model, std::mt19937_64& random);

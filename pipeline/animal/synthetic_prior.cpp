@@ -11,7 +11,7 @@
 namespace q3d::pipeline::animal {
 namespace {
 
-// Keeps a covariance of few motions or measures invertible; the official code's value for shapes.
+// This keeps a covariance of few motions or measures invertible. The value is the official code's for shapes.
 constexpr double kRidge = 1e-5;
 
 Eigen::MatrixXd precision_factor(const Eigen::MatrixXd& covariance) {

@@ -25,11 +25,11 @@ struct ShapePrior {
 PosePrior synthetic_pose_prior();
 ShapePrior synthetic_shape_prior();
 
-// (35, 3) float32 axis-angle, rad: standing, walking, running, grazing, crouching, within the joints' ranges.
-// Row 0, the global orientation, is zero.
+// Returns a pose, (35, 3) float32 axis-angle in rad, within the joints' ranges: standing, walking, running,
+// grazing or crouching. Row 0, the global orientation, is zero.
 torch::Tensor sample_pose(std::mt19937_64& random);
 
-// (41) float32. Families 0 to 4; throws std::invalid_argument on another one.
+// Returns betas, (41) float32, of a family from 0 to 4. Throws std::invalid_argument for any other family.
 torch::Tensor sample_betas(std::int64_t family, std::mt19937_64& random);
 
 }  // namespace q3d::pipeline::animal

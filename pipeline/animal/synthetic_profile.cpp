@@ -8,7 +8,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-// Parts of the trunk's length at which the hips and the shoulders stand, either side of the origin.
+// The positions of hips and shoulders on either side of the origin, as fractions of the trunk's length.
 constexpr double kHipShare = -0.55;
 constexpr double kShoulderShare = 0.45;
 
@@ -16,12 +16,12 @@ Vector3d in_plane(double x, double y) {
   return {x, y, 0.0};
 }
 
-// A unit vector at this elevation over +x.
+// Returns a unit vector at this elevation over +x.
 Vector3d direction(double elevation) {
   return in_plane(std::cos(elevation), std::sin(elevation));
 }
 
-// The same a quarter turn up.
+// Returns that vector, turned upwards by a quarter turn.
 Vector3d normal(double elevation) {
   return direction(elevation + M_PI / 2);
 }
@@ -72,7 +72,7 @@ void add_neck(const Anatomy& a, std::vector<Station>& stations, Vector3d& poll) 
   stations.push_back(across_axis(42, poll, poll_tilt, a.neck_top_depth, a.neck_top_width, 0.1));
 }
 
-// The upper head: from the eyes on its lower outline is the mouth line, below which the jaw hangs.
+// Adds the upper head. In front of the eyes, its lower outline is the mouth line, below which the jaw hangs.
 void add_head(const Anatomy& a, const Vector3d& poll, std::vector<Station>& stations) {
   const Vector3d face = direction(-a.head_pitch);
   const Vector3d up = normal(-a.head_pitch);
@@ -84,7 +84,8 @@ void add_head(const Anatomy& a, const Vector3d& poll, std::vector<Station>& stat
   const double eyes = 1.0 - a.muzzle_share;
   place(45, 0.55 * eyes, 0.52 * a.cranium_depth, -0.48 * a.cranium_depth, a.cranium_width, 0.15);
   place(48, eyes, mouth + a.eye_depth, mouth, 0.80 * a.cranium_width + 0.1 * a.muzzle_width, 0.1);
-  // Close to the corner of the mouth, so that the line there turns at once and the jaw closes along it.
+  // This knot is close to the corner of the mouth, so that the line turns sharply there and the jaw closes
+  // along it.
   place(49, 1.0 - 0.84 * a.muzzle_share, mouth + 0.70 * a.eye_depth + 0.27 * a.muzzle_depth, mouth,
         0.58 * a.cranium_width + 0.36 * a.muzzle_width, -0.35);
   place(51, 1.0 - 0.5 * a.muzzle_share, mouth + a.muzzle_depth, mouth, a.muzzle_width, -0.6);

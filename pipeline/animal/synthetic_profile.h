@@ -9,11 +9,11 @@
 
 namespace q3d::pipeline::animal {
 
-// A smooth curve through knots: cubic Hermite pieces whose slopes are those of the parabola through each knot
-// and its two neighbours.
+// A smooth curve through knots. It consists of cubic Hermite pieces; the slope at a knot is that of the
+// parabola through the knot and its two neighbours.
 class SmoothCurve {
  public:
-  // Strictly increasing positions; values (knots, channels).
+  // Positions must increase strictly. values: (knots, channels).
   SmoothCurve(std::vector<double> positions, Eigen::MatrixXd values);
   Eigen::VectorXd at(double position) const;
 
@@ -27,7 +27,7 @@ class SmoothCurve {
 struct BodyRing {
   Eigen::Vector3d back, belly;
   double half_width;
-  double level;  // where it is widest: -1 at the belly, 0 in the middle, 1 at the back
+  double level;  // height at which it is widest: -1 at the belly, 0 in the middle, 1 at the back
 };
 
 struct BodyProfile {
@@ -53,7 +53,7 @@ struct TubeProfile {
 TubeProfile tube_profile(const Tube& tube, const Anatomy& anatomy, const BodyProfile& body,
                          const Eigen::Vector3d& root);
 
-// y of the ground that the feet stand on.
+// Returns the y of the ground on which the feet stand.
 double ground_height(const Anatomy& anatomy);
 
 }  // namespace q3d::pipeline::animal

@@ -16,7 +16,7 @@ Eigen::VectorXd flat(const Points& points) {
   return Eigen::Map<const Eigen::VectorXd>(points.data(), points.size());
 }
 
-// The change of the animal when one measure grows by one standard deviation.
+// Returns the change of the animal's vertices if one measure grows by one standard deviation.
 Eigen::VectorXd sensitivity(const QuadrupedMesh& mesh, const Anatomy& anatomy, const Measure& measure) {
   const double spread = measure.is_angle ? measure.spread : measure.spread * std::abs(anatomy.*measure.field);
   Anatomy more = anatomy, less = anatomy;

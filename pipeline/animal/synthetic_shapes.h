@@ -23,14 +23,16 @@ struct ShapeSpace {
 
 ShapeSpace make_shape_space(const QuadrupedMesh& mesh);
 
-// The mesh, and the shape space made from it: made on the first call (half a thousand animals), then shared.
+// These return the mesh and its shape space. They are computed on the first call, from some 500 animals, and
+// shared afterwards.
 const QuadrupedMesh& synthetic_mesh();
 const ShapeSpace& synthetic_shape_space();
 
-// (306, 3 V): row 9 (joint - 1) + 3 r + c multiplies entry (r, c) of the joint's rotation minus the identity.
-// Linear blend skinning by weights w and 1 - w pulls a vertex at r from the joint towards it by
-// w (1 - w) (1 - cos angle) r, to second order, as far as r is square to the axis. For any axis,
-// (1 - cos angle) times that part of r is minus the symmetric part of (R - I) times r, which is linear in R.
+// Returns the pose blend shapes, (306, 3 V). Row 9 (joint - 1) + 3 r + c multiplies entry (r, c) of the
+// joint's rotation minus the identity. Linear blend skinning by weights w and 1 - w pulls a vertex at r from
+// the joint towards it by w (1 - w) (1 - cos angle) r, to second order, as far as r is square to the axis.
+// For any axis, (1 - cos angle) times that part of r is minus the symmetric part of (R - I) times r, which is
+// linear in R.
 Eigen::MatrixXd pose_blend_shapes(const Points& rest, const Eigen::MatrixXd& joints,
                                   const Eigen::MatrixXd& weights);
 

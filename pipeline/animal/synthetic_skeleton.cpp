@@ -5,15 +5,15 @@
 namespace q3d::pipeline::animal {
 namespace {
 
-constexpr double kTailBone = 18.0 / 7.0;  // rings to a bone of the tail
+constexpr double kTailBone = 18.0 / 7.0;  // rings for each bone of the tail
 
-// The mean of some vertices of a ring, as a row of the regressor.
+// Adds the mean of some vertices of a ring to a row of the regressor.
 void add_mean(const std::vector<int>& vertices, double weight, Eigen::MatrixXd& regressor, int joint) {
   for (const int vertex : vertices) regressor(joint, vertex) += weight / static_cast<double>(vertices.size());
 }
 
-// A ring's vertices. Of a body ring with a hole only pairs at equal heights over and under its middle are
-// taken, so that their mean stays in the ring's centre.
+// Returns a ring's vertices. In a body ring with a hole, only pairs at equal heights above and below its
+// middle are used, so that their mean stays at the ring's centre.
 std::vector<int> ring_vertices(const QuadrupedMesh& mesh, Part part, int ring) {
   const auto& row = mesh.rings_of(part)[static_cast<std::size_t>(ring)];
   if (part != Part::body) return row;
@@ -25,7 +25,8 @@ std::vector<int> ring_vertices(const QuadrupedMesh& mesh, Part part, int ring) {
   return vertices;
 }
 
-// Sides [first, last] of a body ring, right of the back, or their mirror image.
+// Returns the vertices of the sides [first, last] of a body ring on the right of the back, or their mirror
+// images.
 std::vector<int> flank_vertices(const QuadrupedMesh& mesh, int ring, int first, int last, bool left) {
   std::vector<int> vertices;
   for (int side = first; side <= last; ++side)
@@ -115,7 +116,7 @@ std::vector<std::vector<std::int64_t>> keypoint_groups(const QuadrupedMesh& mesh
           mesh.rings_of(part)[static_cast<std::size_t>(ring)][static_cast<std::size_t>(side)]);
     }
   };
-  // Adds to the right keypoint and its mirror image to the left one.
+  // Adds vertices to the right keypoint, and their mirror images to the left one.
   const auto add_pair = [&](std::size_t left, std::size_t right, Part part, int ring,
                             const std::vector<int>& sides) {
     add(right, part, ring, sides);

@@ -1,4 +1,4 @@
-// Joints, skinning and keypoints of the synthetic quadruped, all given by places on its mesh.
+// Defines joints, skinning and keypoints of the synthetic quadruped by places on its mesh.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,20 +15,21 @@ struct JointSpec {
   const char* name;
   std::int32_t parent;
   Part part;     // the part of the mesh that the joint moves
-  double ring;   // where on it the joint lies
-  double blend;  // rings on either side over which it takes over from the joint before it on the same part
+  double ring;   // position of the joint along the part
+  double blend;  // rings on either side over which its weight replaces that of the previous joint of the part
 };
 
-// SMAL's 35 joints: parents before children, the root at the hips.
+// Returns SMAL's 35 joints, parents before children. The root is at the hips.
 const std::array<JointSpec, smal::kNumJoints>& synthetic_joints();
 
-// (35, V): each joint is a weighted mean of the mesh rings around it; rows are non-negative and sum to 1.
+// Returns (35, V): each joint is a weighted mean of the mesh rings around it. Rows are non-negative and sum
+// to 1.
 Eigen::MatrixXd joint_regressor(const QuadrupedMesh& mesh);
 
-// (V, 35): rows are non-negative and sum to 1, smooth over the mesh.
+// Returns (V, 35). Rows are non-negative, sum to 1 and vary smoothly over the mesh.
 Eigen::MatrixXd skinning_weights(const QuadrupedMesh& mesh);
 
-// The 26 groups of vertices, in the order of the datasets' keypoints.
+// Returns the 26 groups of vertices in the order of the datasets' keypoints.
 std::vector<std::vector<std::int64_t>> keypoint_groups(const QuadrupedMesh& mesh);
 
 }  // namespace q3d::pipeline::animal

@@ -12,8 +12,8 @@ double smooth_step(double t) {
   return t * t * (3.0 - 2.0 * t);
 }
 
-// Adds `share` of the weights that the joints of a part have at one of its rings. The first joint holds
-// whatever lies before it.
+// Adds `share` times the weights that the joints of a part have at one of its rings. Everything before the
+// first joint belongs to that joint.
 void add_chain(Part part, double ring, double share, Eigen::MatrixXd& weights, Eigen::Index vertex) {
   int before = -1;
   for (int joint = 0; joint < smal::kNumJoints; ++joint) {
@@ -30,8 +30,8 @@ void add_chain(Part part, double ring, double share, Eigen::MatrixXd& weights, E
 // Says how a tube's joints pull at the body around its hole.
 struct Root {
   Part part;
-  int solid_ring;  // from here on the tube moves with its own joints alone
-  int passes;      // of smoothing: how far the pull spreads
+  int solid_ring;  // from this ring on the tube moves with its own joints only
+  int passes;      // smoothing passes: how far the pull spreads
   int pad;  // sides of the body above the hole, towards the back, that move with the limb: shoulder blade
             // and haunch
 };
@@ -42,7 +42,8 @@ constexpr Root kRoots[] = {{Part::right_foreleg, 2, 10, 6},
                            {Part::jaw, 1, 2, 0},
                            {Part::right_ear, 1, 2, 0}};
 
-// (V): the share of the tube's bones, 1 on the tube, fading into the body; right and middle tubes only.
+// Returns (V) the share of the tube's bones, which is 1 on the tube and fades into the body. For right and
+// middle tubes only.
 Eigen::VectorXd pull_of(const QuadrupedMesh& mesh, const Root& root) {
   const Hole& hole = tube_of(root.part).hole;
   Eigen::VectorXd pull = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(mesh.vertices.size()));
@@ -74,8 +75,8 @@ Eigen::VectorXd pull_of(const QuadrupedMesh& mesh, const Root& root) {
   return pull;
 }
 
-// The ring of the body that a vertex hangs on: a tube's first rings still move a little with the body at the
-// hole.
+// Returns the ring of the body to which a vertex is attached. The first rings of a tube still move a little
+// with the body at the hole.
 int body_ring(const QuadrupedMesh& mesh, std::size_t vertex) {
   const MeshVertex& at = mesh.vertices[vertex];
   return at.part == Part::body ? at.ring

@@ -8,7 +8,7 @@
 
 namespace q3d::pipeline::animal {
 
-// A float32 copy, row-major, in the given shape.
+// Returns a float32 copy, row-major, in the given shape.
 inline torch::Tensor to_tensor(
     const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>& matrix,
     const std::vector<std::int64_t>& shape) {

@@ -1,4 +1,4 @@
-// The tubes of the synthetic quadruped: legs, tail, jaw and ears.
+// Makes the tubes of the synthetic quadruped: legs, tail, jaw and ears.
 #include <Eigen/Geometry>
 #include <cmath>
 
@@ -27,7 +27,8 @@ SmoothCurve curve_through(const std::vector<Knot>& knots) {
   return {positions, values};
 }
 
-// Rings at 0, 1, ..., across `across_axis`, and square to the curve in the plane of symmetry.
+// Makes rings at the positions 0, 1, ... of the curve. They extend along `across_axis` and are perpendicular
+// to the curve in the plane of symmetry.
 TubeProfile rings_along(const std::vector<Knot>& knots, int rings, const Vector3d& across_axis,
                         const Vector3d& pole) {
   const SmoothCurve curve = curve_through(knots);
@@ -42,9 +43,9 @@ TubeProfile rings_along(const std::vector<Knot>& knots, int rings, const Vector3
   return profile;
 }
 
-// A knot of a leg: the ring's plane is tilted from level (0, the leg points down) to upright (pi / 2, it
-// points forwards) rather than square to the curve, which would fold thick rings into each other at a short
-// foot.
+// A knot of a leg. The tilt of the ring's plane is given, from level (0, the leg points down) to upright (pi
+// / 2, it points forwards). Planes perpendicular to the curve would fold thick rings into each other at a
+// short foot.
 struct LegKnot {
   double ring;
   Vector3d center;
@@ -71,7 +72,7 @@ TubeProfile leg_rings(const std::vector<LegKnot>& knots, int rings, const Vector
   return profile;
 }
 
-// The last rings of a leg: fetlock, heel, ball and toes, flat on the ground. Returns the pole.
+// Adds the last rings of a leg: fetlock, heel, ball and toes, flat on the ground. Returns the pole.
 Vector3d add_foot(const Anatomy& a, double first_ring, const Vector3d& fetlock, double cannon,
                   std::vector<LegKnot>& knots) {
   const double floor = ground_height(a);
@@ -146,7 +147,7 @@ TubeProfile tail(const Tube& tube, const Anatomy& a, const Vector3d& root) {
       tube.rings, -Vector3d::UnitZ(), knot(19, 1.0, 0).center);
 }
 
-// Hangs under the muzzle, a narrow gap below the mouth line.
+// Makes the jaw, which hangs under the muzzle with a narrow gap below the mouth line.
 TubeProfile jaw(const Tube& tube, const Anatomy& a, const BodyProfile& body) {
   const BodyRing& corner = body.rings[48];
   const BodyRing& front = body.rings[54];

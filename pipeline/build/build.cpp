@@ -22,7 +22,7 @@
 namespace q3d::pipeline::build {
 namespace {
 
-// The datasets with pseudo labels, by name, with the errors of their predictions.
+// Returns the datasets with pseudo labels, by name, with the errors of their predictions.
 std::vector<PoolErrors> pools_of(const config::JudgingRules& rules, const candidates::Ingest& ingest,
                                  const dataset::JudgementList& judgements) {
   if (rules.thresholds.empty()) return {};
@@ -55,8 +55,8 @@ void publish_units(const config::BuildConfig& config, const config::JudgingRules
   publish(summary.folder, inputs, units.judgements(), units.shards());
 }
 
-// Makes this rank's units. In rank 0 the dataset is then ready to be published, unless the request ends
-// before.
+// Makes this rank's units. In rank 0 the dataset can then be published, unless the request ends at an earlier
+// stage.
 void make_units(const config::JudgingRules& rules, const BuildRequest& request, RankShare& ranks,
                 Workspace& workspace, BuildSummary& summary) {
   const stages::Stage until = request.until.value_or(stages::Stage::shards);
@@ -64,7 +64,7 @@ void make_units(const config::JudgingRules& rules, const BuildRequest& request, 
     return std::make_unique<UnitBuilder>(ranks.config(), rules, summary.plan.keys, until, workspace, ranks);
   };
   std::unique_ptr<UnitBuilder> units;
-  if (ranks.leads() && !summary.was_up_to_date) units = make();  // takes over what an earlier run left
+  if (ranks.leads() && !summary.was_up_to_date) units = make();  // takes over the results of an earlier run
   summary.was_up_to_date = ranks.agree(summary.plan.keys.dataset, summary.was_up_to_date);
   if (summary.was_up_to_date) return;
   if (!units) units = make();
@@ -77,7 +77,8 @@ void make_units(const config::JudgingRules& rules, const BuildRequest& request, 
   }
 }
 
-// A rank whose last units the others have made too may find rank 0 gone.
+// Makes the units of a rank other than 0. Rank 0 may have ended already if other ranks made the last units
+// too; this is no error.
 void make_units_beside_leader(const config::JudgingRules& rules, const BuildRequest& request,
                               RankShare& ranks, Workspace& workspace, BuildSummary& summary) {
   try {
@@ -93,14 +94,14 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-// Names the device in the build's keys. A missing checkpoint is told when it is read.
+// Returns the device's name in the build's keys. A missing checkpoint is reported when it is read.
 std::string device_of(const config::BuildConfig& config) {
   const bool has_network =
       config::needs_network(config) && std::filesystem::exists(config.network.checkpoint);
   return has_network ? network::device_key(config.network) : std::string();
 }
 
-// The plan of a finished version; nothing if it is gone or damaged.
+// Returns the plan of a finished version, or nothing if it is gone or damaged.
 std::optional<stages::BuildPlan> plan_of_version(const std::filesystem::path& out,
                                                  const std::string& version) {
   for (stages::BuildPlan& plan : stages::read_build_plans(out)) {
@@ -109,8 +110,8 @@ std::optional<stages::BuildPlan> plan_of_version(const std::filesystem::path& ou
   return std::nullopt;
 }
 
-// Fills the summary from the record of an earlier build if nothing has changed since. A build without its
-// plan goes the whole way, which writes the plan again.
+// Fills the summary from the record of an earlier build if nothing has changed since. A build whose plan is
+// missing runs in full, which writes the plan again.
 bool is_unchanged(const run::RunOptions& options, const UpToDateRecord& record, BuildSummary& summary) {
   auto found = record.unchanged();
   if (!found) return false;
@@ -125,7 +126,7 @@ bool is_unchanged(const run::RunOptions& options, const UpToDateRecord& record, 
   return true;
 }
 
-// Tells what a finished dataset is worth, and makes it the newest. The caller holds the folder's lock.
+// Reports the quality of a finished dataset and makes it the newest. The caller holds the folder's lock.
 void finish(const config::BuildConfig& config, const run::RunOptions& options, BuildSummary& summary,
             Clock::time_point start) {
   summary.dataset = dataset::read_dataset_manifest(summary.folder);

@@ -55,7 +55,8 @@ const config::DatasetConfig& dataset_of(const manifests::SampleRecord& record,
   });
 }
 
-// Takes every unit as far as its predictions, using those of an earlier run. The caller adds `write`.
+// Returns a flow that makes the predictions of every unit, or loads those of an earlier run. The caller adds
+// `write`.
 unit::UnitFlow prediction_flow(const config::BuildConfig& config, Workspace& workspace,
                                stages::StageStore& predictions, PredictionProgress& predicted) {
   unit::UnitFlow flow;
@@ -81,7 +82,7 @@ void save_predictions(const unit::UnitWork& work, stages::StageStore& prediction
   if (!work.predicted_before) predictions.save(*work.unit, unit::to_table(work.candidates, *work.predicted));
 }
 
-// Lets the ranks share the predictions. Afterwards rank 0 finds those of all ranks in `predictions`.
+// Lets the ranks share the predictions. Afterwards, in rank 0, `predictions` holds those of all ranks.
 void predict_with_ranks(const config::BuildConfig& config, Workspace& workspace,
                         stages::StageStore& predictions, RankShare& ranks) {
   run::Progress progress("predicted", static_cast<std::int64_t>(workspace.ingest().candidates.size()),
@@ -128,7 +129,7 @@ std::vector<Scored> score_pool(const config::BuildConfig& config, Workspace& wor
   return scored;
 }
 
-// A digest of everything that all ranks must have in common.
+// Returns a digest of everything that must be the same in all ranks.
 std::string key_of_predictions(const config::BuildConfig& config, const Workspace& workspace) {
   std::string text = stages::predict_key(config, workspace.assets(), workspace.device_key());
   for (const candidates::Unit& unit : workspace.ingest().units) text += '\n' + unit.input_digest;
@@ -143,7 +144,7 @@ std::vector<Scored> predict_pool(const config::BuildConfig& config, Workspace& w
         &candidates::Unit::input_digest, ranks.of_store());
   };
   std::unique_ptr<stages::StageStore> predictions;
-  if (ranks.leads()) predictions = open();  // takes over what an earlier run left
+  if (ranks.leads()) predictions = open();  // takes over the results of an earlier run
   if (ranks.is_shared()) {
     ranks.agree(key_of_predictions(config, workspace), false);
     if (!predictions) predictions = open();
@@ -189,8 +190,8 @@ std::vector<bool> adapt_some(const std::vector<const Scored*>& candidates, const
   return passes;
 }
 
-// Adapts candidates from tau_low upwards, a chunk at a time, until enough have passed. Those further out keep
-// `passes_adaptation`: they lie beyond tau_high whatever they would do.
+// Adapts candidates from tau_low upwards, a chunk at a time, until enough have passed. Candidates with larger
+// errors keep `passes_adaptation`, because they lie beyond tau_high in any case.
 std::int64_t adapt_until_enough(std::vector<filters::CalibrationSample>& pool,
                                 const std::vector<Scored>& candidates, const filters::Thresholds& limits,
                                 const config::BuildConfig& config, Workspace& workspace) {
@@ -252,7 +253,7 @@ filters::CalibratedPool calibrate_pool(const std::string& dataset, const std::ve
   }
   filters::Thresholds base;
   base.delta = delta_of(dataset, config.filter);
-  // tau_low is a quantile of the errors alone; what passes adaptation decides tau_high.
+  // tau_low is a quantile of the errors alone; tau_high depends on how many candidates pass adaptation.
   filters::Thresholds limits = filters::calibrate(pool, config.calibrate, base).thresholds;
   require_stop_below(config.tta.stop_below, limits.tau_low);
   limits.stop_below = config.tta.stop_below;
@@ -273,8 +274,8 @@ filters::CalibratedPool calibrate_pool(const std::string& dataset, const std::ve
   return result;
 }
 
-// Returns the warnings that can be given of the pool before any label is made. A threshold that all datasets
-// share is reported for each of them.
+// Returns the warnings about the pool that can be given before any label is made. A threshold that all
+// datasets share is reported for each of them.
 std::vector<dataset::Warning> warnings_of(const std::vector<Scored>& scored,
                                           const std::vector<filters::CalibratedPool>& calibrated,
                                           const config::BuildConfig& config, const Workspace& workspace) {
@@ -295,7 +296,8 @@ std::vector<dataset::Warning> warnings_of(const std::vector<Scored>& scored,
   return quality_warnings(list, workspace.origins(), config.filter.tau_ceiling);
 }
 
-// All candidates under the empty name, or those of each dataset with pseudo labels under its own.
+// Returns all candidates under an empty name, or the candidates of each dataset with pseudo labels under its
+// name.
 std::map<std::string, std::vector<Scored>> split_pool(std::vector<Scored> scored,
                                                       const config::BuildConfig& config) {
   std::map<std::string, std::vector<Scored>> pools;

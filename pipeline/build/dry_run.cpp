@@ -47,7 +47,7 @@ class Forecaster {
     return {out_, std::string(to_string(stage)), key_of(plan_.keys, stage)};
   }
 
-  // The state of every unit's file, in the order of the units.
+  // Returns the state of every unit's file, in the order of the units.
   std::vector<UnitState> states(Stage stage) const {
     const stages::StageView folder = view(stage);
     std::vector<UnitState> found;
@@ -82,7 +82,7 @@ class Forecaster {
     return result;
   }
 
-  // A unit needs no table of stored crops once it has its shard.
+  // Clears the need for a table of stored crops of units that have their shard.
   static void excuse_crops(const std::vector<UnitState>& crops, const std::vector<UnitState>& shards,
                            StageForecast& result) {
     for (std::size_t i = 0; i < crops.size(); ++i) {
@@ -92,7 +92,7 @@ class Forecaster {
     if (result.made == 0) result.why.clear();
   }
 
-  // Why the stage's key is new.
+  // Says why the stage's key is new.
   std::string why_new(Stage stage) const {
     const auto nearest = stages::nearest_plan(plans_, plan_, stage, latest_);
     if (!nearest) return "no build in this folder has made the stage";

@@ -16,18 +16,18 @@ namespace q3d::pipeline::build {
 struct StageForecast {
   stages::Stage stage = stages::Stage::predict;
   std::string key;               // 64 hex digits
-  std::filesystem::path folder;  // relative to the output folder; it need not be there
+  std::filesystem::path folder;  // relative to the output folder; it need not exist
   std::int64_t reused = 0;       // units
-  std::int64_t made = 0;  // units; of `crops`, those that get a table if one of their candidates is kept
+  std::int64_t made = 0;  // units; for `crops`, those that get a table if one of their candidates is kept
   std::int64_t not_needed = 0;   // units without stored crops that have their shard
-  std::vector<std::string> why;  // units are made: sentences without a full stop
+  std::vector<std::string> why;  // reasons why units are made: sentences without a full stop
 };
 
 struct DryRun {
   std::string version;  // "<name>-<first 12 hex digits of the key>"
   std::int64_t candidates = 0;
   std::int64_t units = 0;
-  bool is_up_to_date = false;  // the finished dataset is there and sound: nothing would be made
+  bool is_up_to_date = false;  // the finished dataset exists and is undamaged: nothing would be made
   std::vector<StageForecast> stages;
 };
 

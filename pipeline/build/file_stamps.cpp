@@ -21,7 +21,7 @@ using manifests::FileStamp;
 using manifests::next_field;
 using manifests::stamp_of;
 
-// The first character of a line.
+// The first character of a line is one of these.
 constexpr char kFolder = '/';
 constexpr char kAbsent = '-';
 constexpr char kPresent = '+';
@@ -78,7 +78,7 @@ std::optional<std::vector<std::string>> folders_below(const fs::path& folder, co
       folders.push_back(entry->path().string());
     }
   }
-  if (error) return std::nullopt;  // a folder that cannot be listed: nothing can be said of it
+  if (error) return std::nullopt;  // a folder that cannot be listed
   return folders;
 }
 

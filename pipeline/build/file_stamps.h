@@ -1,4 +1,4 @@
-// The stamps (manifests/file_stamp.h) of many files and folders, and their text form.
+// Takes, compares, writes and reads the stamps (manifests/file_stamp.h) of many files and folders.
 #pragma once
 
 #include <cstdint>
@@ -15,20 +15,20 @@ namespace q3d::pipeline::build {
 
 struct StampedFile {
   std::string path;
-  std::optional<manifests::FileStamp> stamp;  // nothing: there is no such file, and there must be none
+  std::optional<manifests::FileStamp> stamp;  // empty if the file is absent; it must stay absent
 };
 
-// Takes the stamps in parallel, in the order of the paths.
+// Takes the stamps of the paths in parallel. The result is in the order of the paths.
 std::vector<StampedFile> stamp_files(std::vector<std::string> paths);
-// Says whether each file still has its stamp. Compares in parallel, and stops at the first that has not.
+// Returns whether every file still has its stamp. Compares in parallel, and stops at the first difference.
 bool have_stamps(std::span<const StampedFile> files);
 
-// The newest change of any of the files, in ns since 1970; 0 if there are none.
+// Returns the time of the newest change of any of the files, in ns since 1970; 0 if there are none.
 std::int64_t newest_change_ns(std::span<const StampedFile> files);
 
-// The folder and every folder below it, without those reached through symbolic links and without `except`. A
-// file that is added, removed or renamed changes the stamp of its folder. Nothing if there are more than
-// `most` entries.
+// Returns the folder and every folder below it, without those reached through symbolic links and without
+// `except`. A file that is added, removed or renamed changes the stamp of its folder. Returns nothing if
+// there are more than `most` entries.
 std::optional<std::vector<std::string>> folders_below(const std::filesystem::path& folder,
                                                       const std::filesystem::path& except, std::size_t most);
 
@@ -39,7 +39,7 @@ class StampWriter {
   bool append(std::span<const StampedFile> files, std::string& text);
 
  private:
-  std::string folder_;  // of the last file, with its '/'
+  std::string folder_;  // folder of the last file, with its '/'
 };
 
 // Reads the lines of a StampWriter, given in their order and without line feeds.

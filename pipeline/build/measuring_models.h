@@ -1,4 +1,4 @@
-// Loads what labels are measured with.
+// Loads the models with which labels are measured.
 #pragma once
 
 #include "pipeline/config/build_config.h"

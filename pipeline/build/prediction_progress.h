@@ -1,4 +1,4 @@
-// The progress of a run that predicts whole units, moving after each batch.
+// The progress of a run that predicts whole units. It advances after each batch.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +22,7 @@ class PredictionProgress : public unit::StepObserver {
                   std::size_t /*total*/) override {
     tell();
   }
-  // After a unit, which may have had no batch.
+  // Call this after each unit, which may have had no batch.
   void tell() { progress_.advance(std::exchange(fresh_, 0)); }
 
  private:

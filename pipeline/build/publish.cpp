@@ -26,7 +26,7 @@ namespace fs = std::filesystem;
 std::vector<dataset::ShardEntry> link_shards(const fs::path& folder, const candidates::Ingest& ingest,
                                              stages::StageStore& shards) {
   fs::create_directories(folder / "shards");
-  manifests::remove_temporaries(folder);  // what a build that was killed while it published left
+  manifests::remove_temporaries(folder);  // of a build that was killed while publishing
   manifests::remove_temporaries(folder / "shards");
   std::vector<dataset::ShardEntry> entries;
   for (const candidates::Unit& unit : ingest.units) {
@@ -65,7 +65,8 @@ int formula_cells(const candidates::Candidate& candidate, const manifests::Judge
   return cells;
 }
 
-// Names come from annotation files, and verdicts.csv may be opened in a spreadsheet.
+// Warns of cells that a spreadsheet could evaluate: names come from annotation files, and people may open
+// verdicts.csv in a spreadsheet.
 void warn_of_formulas(std::int64_t cells) {
   if (cells == 0) return;
   run::log_warning(fmt::format(

@@ -9,7 +9,7 @@
 
 namespace q3d::pipeline::build {
 
-// <out>/<name>-<first 12 hex of the dataset key>.
+// Returns <out>/<name>-<first 12 hex digits of the dataset key>.
 std::filesystem::path version_folder(const std::filesystem::path& out, const config::BuildConfig& config,
                                      const stages::StageKeys& keys);
 
@@ -19,7 +19,7 @@ std::filesystem::path version_folder(const std::filesystem::path& out, const con
 void publish(const std::filesystem::path& folder, const dataset::DatasetInputs& inputs,
              const dataset::JudgementList& judgements, stages::StageStore& shards);
 
-// Makes <out>/latest a link to the version's folder, in one step, and durable.
+// Makes <out>/latest a link to the version's folder, in one step and durably.
 void point_latest(const std::filesystem::path& out, const std::filesystem::path& folder);
 
 }  // namespace q3d::pipeline::build

@@ -1,5 +1,5 @@
-// Judges whether labels are good in absolute terms. The shares of a calibration cannot say so, because they
-// are met on any pictures.
+// Judges whether labels are good in absolute terms. The shares of a calibration do not show this, because any
+// set of pictures meets them.
 #pragma once
 
 #include <filesystem>
@@ -14,7 +14,7 @@
 
 namespace q3d::pipeline::build {
 
-// One dataset with pseudo labels, all its splits.
+// One dataset with pseudo labels, with all its splits.
 struct PoolErrors {
   std::string dataset;
   bool is_rendered = false;    // every picture comes from `sample`
@@ -22,14 +22,15 @@ struct PoolErrors {
   double tau_high = 0.0;       // crop units
 };
 
-// The origins that the files of network and body state.
+// The origins of network and body, as their files state them.
 struct Origins {
   device::NetworkDomain domain;
   bool has_rendered_body = false;
 };
 
-// The warnings in the order of WarningKind, and of the datasets within. A pool counts as outside the domain
-// if the median of its errors is above the 0.95 quantile of the network's own held-out pictures.
+// Returns the warnings in the order of WarningKind and, within a kind, of the datasets. A pool counts as
+// outside the domain if the median of its errors is above the 0.95 quantile of the network's own held-out
+// pictures.
 std::vector<dataset::Warning> quality_warnings(const std::vector<PoolErrors>& pools, const Origins& origins,
                                                double tau_ceiling);
 
@@ -37,8 +38,8 @@ std::vector<dataset::Warning> quality_warnings(const std::vector<PoolErrors>& po
 // the thresholds above the ceiling.
 void require_below_ceiling(const std::string& dataset, double tau_high, double tau_ceiling);
 
-// The rules of a build, after all checks that need nothing but its config. Throws ConfigError, and as
-// require_below_ceiling unless `above_ceiling`.
+// Returns the rules of a build after all checks that need only its config. Throws ConfigError, and as
+// require_below_ceiling does unless `above_ceiling`.
 config::JudgingRules checked_rules(const config::BuildConfig& config, bool above_ceiling);
 
 // Throws std::runtime_error that says why, if the dataset in `folder` has no label, or if more than

@@ -25,9 +25,9 @@ using model::ranks::StoreLost;
 constexpr const char* kDigests = "phase/digests";
 constexpr const char* kStart = "phase/start";
 constexpr const char* kEnd = "phase/end";
-constexpr int kUnitsInFlight = 2;  // more would be units that another rank could make
+constexpr int kUnitsInFlight = 2;  // more would take units that another rank could make
 constexpr std::chrono::milliseconds kPause{200};
-constexpr std::chrono::seconds kFarewell{5};  // rank 0 leaves the store open for the others' last words
+constexpr std::chrono::seconds kFarewell{5};  // rank 0 keeps the store open so long for last messages
 
 RankPlace find_place(bool shares_units) {
   if (!shares_units) return {};
@@ -48,8 +48,8 @@ void require_stated_threads(const config::BuildConfig& config) {
       "network.compute_threads=4");
 }
 
-// Ranks that were killed while they wrote have left temporary files in the stages' folders. A rank that still
-// writes one has its unit made by another rank.
+// Removes the temporary files that killed ranks have left in the stages' folders. If a slow rank is still
+// writing one, another rank makes its unit.
 void remove_leftovers(const std::filesystem::path& out) {
   for (const auto& entry : std::filesystem::directory_iterator(out / "stages")) {
     if (entry.is_directory()) manifests::remove_temporaries(entry.path());
@@ -98,10 +98,10 @@ RankShare::~RankShare() {
   life_.join();
   try {
     claims_->leave();
-    // Rank 0 failed, and holds the store: the others shall hear of it, also those that are about to come.
+    // Rank 0 failed and holds the store, so it tells the others, including those that are about to join.
     if (leads() && !is_over_ && !place_.launcher_has_store) say_farewell();
   } catch (const std::exception&) {
-    // The others notice that this rank gives no more signs of life.
+    // The other ranks notice that this rank no longer gives signs of life.
   }
 }
 
@@ -124,7 +124,7 @@ void RankShare::keep_alive(const std::stop_token& stop) {
   }
 }
 
-// Asks at once: what this rank heard last may be from before a pause.
+// Asks rank 0 now, because the last answer may be older than a pause of this process.
 void RankShare::hear_leader() {
   if (leads()) return;
   try {
@@ -139,7 +139,7 @@ void RankShare::pause() const {
   std::this_thread::sleep_for(std::max(kPause, std::chrono::milliseconds(2 * place_.size)));
 }
 
-// Nothing if rank 0 has ended the work before.
+// Waits for a key in the store. Returns nothing if rank 0 ends the work before.
 std::optional<std::string> RankShare::await_word(const std::string& key) {
   try {
     for (;;) {
@@ -149,7 +149,7 @@ std::optional<std::string> RankShare::await_word(const std::string& key) {
       pause();
     }
   } catch (const StoreLost&) {
-    // Rank 0 holds the store.
+    // The store is gone because rank 0, which holds it, has ended.
   }
   throw LeaderLost(fmt::format("rank {} of {}: rank 0 ended before the work began; its own message says why",
                                place_.rank, place_.size));
@@ -192,7 +192,7 @@ std::optional<std::int64_t> RankShare::claim(std::int64_t units) {
   try {
     return claims_->next(units);
   } catch (const StoreLost&) {
-    is_store_lost_ = true;  // what is open comes to its end first
+    is_store_lost_ = true;  // open units are finished first
     return std::nullopt;
   }
 }
@@ -216,7 +216,7 @@ void RankShare::make(unit::UnitFlow flow, device::DeviceWorker& device, const Co
     try {
       write(work);
     } catch (const std::exception&) {
-      // Rank 0 took this rank for dead, perhaps because it was paused, and has cleared its files away.
+      // Rank 0 may have taken this rank for dead, perhaps because it was paused, and removed its files.
       hear_leader();
       if (!is_over_ && !is_store_lost_) throw;
       return;
@@ -258,7 +258,7 @@ void RankShare::make(unit::UnitFlow flow, device::DeviceWorker& device, const Co
   }
 }
 
-// Keeps the store for ranks that are about to come or to leave.
+// Keeps the store open for ranks that are about to join or to leave.
 void RankShare::say_farewell() {
   const auto deadline = std::chrono::steady_clock::now() + kFarewell;
   while (!claims_->have_all_left() && std::chrono::steady_clock::now() < deadline && !run::interrupted()) {

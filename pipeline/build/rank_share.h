@@ -1,7 +1,7 @@
 // One process's part in a run that several ranks share: torchrun or srun starts the same command several
 // times, the ranks meet in a store, and each takes units until none is left. Rank 0 leads: it holds the
-// output folder's lock, reads the candidates first, takes the lines of all journals over, publishes, and
-// speaks for all.
+// output folder's lock, reads the candidates first, takes over the lines of all journals, publishes, and
+// reports for all.
 #pragma once
 
 #include <atomic>
@@ -25,7 +25,7 @@
 
 namespace q3d::pipeline::build {
 
-// Rank 0 cannot be reached any more. What this rank has finished stays.
+// Says that rank 0 cannot be reached any more. The units that this rank has finished remain.
 class LeaderLost : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -35,7 +35,7 @@ class RankShare {
  public:
   // The ranks are those of the environment if options.shares_units is set, else this process is alone. Rank 0
   // waits for nobody. Throws ConfigError, also for a network on the CPU without a number of compute_threads,
-  // and std::runtime_error when rank 0 is not reached in time.
+  // and std::runtime_error if rank 0 is not reached in time.
   RankShare(const config::BuildConfig& config, const run::RunOptions& options, const std::string& purpose);
   ~RankShare();
   RankShare(const RankShare&) = delete;
@@ -45,14 +45,14 @@ class RankShare {
   bool leads() const { return place_.rank == 0; }
   int rank() const { return place_.rank; }
 
-  // The config with this rank's GPU, and the options with its part of the machine's cores; only rank 0 is
-  // loud.
+  // These return the config with this rank's GPU, and the options with its part of the machine's cores. All
+  // ranks but rank 0 are quiet.
   const config::BuildConfig& config() const { return config_; }
   const run::RunOptions& options() const { return options_; }
 
   // Rank 0 digests the pictures; the others read the candidates when its digests are there. The others wait
-  // in the first function until rank 0 calls the second. Returns false if rank 0 has called end() instead:
-  // nothing is to be done. Throws LeaderLost and Interrupted.
+  // in the first function until rank 0 calls the second. Returns false if rank 0 has called end() instead, so
+  // that there is nothing to do. Throws LeaderLost and Interrupted.
   bool await_digests();
   void tell_digests();
 
@@ -60,17 +60,18 @@ class RankShare {
   // `is_done`. `key` names the work. Throws ConfigError if rank 0 has another, LeaderLost and Interrupted.
   bool agree(const std::string& key, bool is_done);
 
-  // Whose lines go where. For ranks other than 0 it is complete after agree().
+  // Says in which journals this rank keeps its lines. For ranks other than 0 it is complete after agree().
   stages::RankOfStore of_store() const;
 
   using Count = std::function<model::ranks::Tally(const unit::UnitWork&)>;
   using TellOthers = std::function<void(const model::ranks::Tally&)>;
-  // Makes units until no rank that lives has an open one. `count` gives a finished unit's numbers, and
-  // `tell_others`, in rank 0, hears from time to time their sum over the other ranks, on a thread of its own.
+  // Makes units until no living rank has an open one. `count` returns the numbers of a finished unit. In rank
+  // 0, `tell_others` is called now and then, on a separate thread, with their sum over the other ranks.
   // Throws LeaderLost, Interrupted, and what the flow throws.
   void make(unit::UnitFlow flow, device::DeviceWorker& device, const Count& count, TellOthers tell_others);
 
-  // Rank 0 has nothing more for the others to do, and clears away what killed ranks have left.
+  // Tells the other ranks that no work is left, and removes the temporary files of killed ranks. Called by
+  // rank 0.
   void end();
 
  private:
@@ -85,7 +86,7 @@ class RankShare {
   config::BuildConfig config_;
   run::RunOptions options_;
   std::string run_;
-  std::unique_ptr<model::ranks::SharedStore> store_;  // null when alone
+  std::unique_ptr<model::ranks::SharedStore> store_;  // null if this process is alone
   std::unique_ptr<model::ranks::UnitClaims> claims_;
   std::atomic<bool> is_store_lost_ = false;
   std::atomic<bool> is_over_ = false;  // rank 0 needs no more units

@@ -25,10 +25,11 @@ using dataset::Damage;
 struct Findings {
   std::vector<std::string> problems;
   std::vector<Damage> damage;
-  bool has_manifest = true;  // dataset.json is as it was written
+  bool has_manifest = true;  // dataset.json is undamaged
 };
 
-// Without a dataset.json, nothing says what the other files of the dataset must be; a build finds out.
+// Finds the problems of a dataset and its stages. Without a sound dataset.json the other files cannot be
+// checked; the build that follows checks them.
 Findings find_problems(const fs::path& folder, bool quiet) {
   try {
     dataset::VerifySummary summary = dataset::verify(folder, quiet, /*with_stages=*/true);
@@ -43,7 +44,7 @@ Findings find_problems(const fs::path& folder, bool quiet) {
   }
 }
 
-// Moves a file to <out>/quarantine. Returns its new place; nothing if it is gone.
+// Moves a file to <out>/quarantine. Returns its new path, or nothing if the file is gone.
 std::optional<fs::path> quarantine(const fs::path& out, const fs::path& file) {
   if (!fs::exists(fs::symlink_status(file))) return std::nullopt;
   const fs::path wanted = out / "quarantine" / file.lexically_relative(out);
@@ -56,7 +57,8 @@ std::optional<fs::path> quarantine(const fs::path& out, const fs::path& file) {
   return place;
 }
 
-// A build needs the sound lines of a journal, and writes the file anew itself. So the quarantine gets a copy.
+// Copies a damaged journal to the quarantine. The original stays, because a build needs its undamaged lines
+// and rewrites the file itself.
 std::optional<fs::path> quarantine_copy(const fs::path& out, const fs::path& file) {
   const std::string content = manifests::read_file(file);
   const auto place = quarantine(out, file);
@@ -64,7 +66,7 @@ std::optional<fs::path> quarantine_copy(const fs::path& out, const fs::path& fil
   return place;
 }
 
-// Shards that lie in the output folder: those of the stages and those of its datasets.
+// Returns all shards in the output folder: those of the stages and those of its datasets.
 std::vector<fs::path> all_shards(const fs::path& out) {
   std::vector<fs::path> files;
   for (const auto& entry : fs::recursive_directory_iterator(out)) {
@@ -77,7 +79,7 @@ std::vector<fs::path> all_shards(const fs::path& out) {
   return files;
 }
 
-// Links every missing file of which there is a copy.
+// Links every missing file that has a copy.
 std::vector<fs::path> mend_from_copies(const fs::path& out, const std::vector<Damage>& damage) {
   std::vector<fs::path> mended;
   const bool wants_any = std::any_of(damage.begin(), damage.end(),
@@ -105,7 +107,7 @@ void require_same_config(const fs::path& folder, const config::BuildConfig& conf
       folder.string()));
 }
 
-// Takes all units through the stages again, where only what is missing is made.
+// Runs all units through the stages again, where only missing files are made.
 void build_again(const fs::path& folder, const config::BuildConfig& config, run::RunOptions options,
                  const std::optional<std::string>& document, RepairSummary& summary) {
   options.out = folder.parent_path();

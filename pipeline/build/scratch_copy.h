@@ -1,12 +1,12 @@
-// A folder that takes an output folder's place in a run that must write nothing into it.
+// A folder that replaces an output folder in a run that must write nothing into it.
 #pragma once
 
 #include <filesystem>
 
 namespace q3d::pipeline::build {
 
-// Made in the system's folder of temporary files, with copies of the output folder's caches (digests.txt,
-// picture_hashes.txt), and removed in the end.
+// It is made in the system's folder of temporary files, with copies of the output folder's caches
+// (digests.txt, picture_hashes.txt), and the destructor removes it.
 class ScratchCopy {
  public:
   // `out` need not exist. Throws std::filesystem::filesystem_error or std::runtime_error when the folder

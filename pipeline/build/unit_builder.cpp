@@ -49,7 +49,7 @@ UnitBuilder::UnitBuilder(const config::BuildConfig& config, const config::Judgin
 }
 
 void UnitBuilder::run() {
-  if (measurements_) {  // before any work, so that missing priors are told at once
+  if (measurements_) {  // before any work, so that missing priors are reported at once
     workspace_.device().run(
         [this] { measurer_ = std::make_unique<unit::LabelMeasurer>(load_measuring_models(config_)); });
   }
@@ -75,7 +75,7 @@ unit::UnitFlow UnitBuilder::flow() {
   return flow;
 }
 
-// Takes over what the other ranks have made, and makes what a rank that died has left undone.
+// Takes over the units that the other ranks have made, and makes those that a dead rank has left undone.
 void UnitBuilder::collect() {
   for (stages::StageStore* store : {&predictions_, &refinements_, &crops_, &shards_})
     store->take_over_ranks();
@@ -107,10 +107,10 @@ std::shared_ptr<unit::UnitWork> UnitBuilder::read(std::int64_t index) {
 }
 
 void UnitBuilder::decode(unit::UnitWork& work) {
-  // Here, because several units are decoded at once: these read whole files. A run that ends before the crops
-  // needs no more of them than one that finds the shard.
+  // These calls read whole files, so they are made here, where several units are processed at once. A run
+  // that ends before the crops needs no more of them than one that finds the shard.
   work.shard_before = !makes(Stage::crops) || shards_.has(*work.unit);
-  // A repair makes the unit's stored crops again too, which nobody would read otherwise.
+  // A repair also makes the unit's stored crops again, although nothing would read them otherwise.
   if (workspace_.rebuilds() && !crops_.has(*work.unit)) work.shard_before = false;
   if (!work.shard_before) {
     if (auto table = crops_.load(*work.unit)) work.crops = unit::crops_from_table(std::move(*table));
@@ -118,7 +118,7 @@ void UnitBuilder::decode(unit::UnitWork& work) {
   unit::decode_unit(work, config_.shards, makes(Stage::refine) ? &rules_ : nullptr);
 }
 
-// The paper's Stage 2 on one unit.
+// Runs the paper's Stage 2 on one unit.
 void UnitBuilder::compute(unit::UnitWork& work) {
   const unit::NetworkSource network = [this]() -> device::Network& { return workspace_.network(); };
   if (!work.predicted) {
@@ -141,7 +141,7 @@ void UnitBuilder::judge_and_refine(unit::UnitWork& work, const unit::NetworkSour
   }
 }
 
-// Whether an earlier run had left all that this run makes of the unit.
+// Returns whether an earlier run had already made everything that this run makes of the unit.
 bool UnitBuilder::was_done(const unit::UnitWork& work) const {
   return work.predicted_before && (!makes(Stage::refine) || work.refined_before) &&
          (!measurements_ || work.measured_before) && (!makes(Stage::shards) || work.shard_before);
@@ -152,7 +152,8 @@ void UnitBuilder::write(unit::UnitWork& work) {
   if (!work.predicted_before) predictions_.save(unit, unit::to_table(work.candidates, *work.predicted));
   if (work.refined && !work.refined_before) refinements_.save(unit, unit::to_table(*work.refined));
   if (work.measured && !work.measured_before) measurements_->save(unit, unit::to_table(*work.measured));
-  // Before the shard, so that a build which is killed in between has no crop to encode again.
+  // The crops are saved before the shard, so that a build which is killed in between need not encode them
+  // again.
   if (work.crops_encoded > 0) crops_.save(unit, unit::to_table(work.crops));
   crops_encoded_ += static_cast<std::int64_t>(work.crops_encoded);
   if (makes(Stage::shards) && !work.shard_before) write_unit_shard(work);

@@ -1,4 +1,4 @@
-// Takes every unit of a build through its stages, using what earlier runs left in the stages' folders.
+// Takes every unit of a build through its stages, using the results of earlier runs in the stages' folders.
 #pragma once
 
 #include <cstdint>
@@ -29,12 +29,12 @@ class UnitBuilder {
   UnitBuilder(const config::BuildConfig& config, const config::JudgingRules& rules,
               const stages::StageKeys& keys, stages::Stage until, Workspace& workspace, RankShare& ranks);
 
-  // Makes every unit, or this rank's; rank 0 then takes over what the others made, and makes what they left
-  // undone. Throws std::runtime_error, manifests::IoError, Interrupted.
+  // Makes every unit, or the units of this rank. Rank 0 then takes over the units of the others, and makes
+  // those that they left undone. Throws std::runtime_error, manifests::IoError, Interrupted.
   void run();
 
-  // The judgements of every unit; a rank other than 0 has those that it made. They are final only if `until`
-  // is the last stage.
+  // Returns the judgements of every unit, or, in a rank other than 0, of the units that it made. They are
+  // final only if `until` is the last stage.
   const dataset::JudgementList& judgements() const { return judgements_; }
   stages::StageStore& shards() { return shards_; }
   std::int64_t crops_encoded() const { return crops_encoded_; }  // by this process

@@ -1,5 +1,5 @@
-// The progress of a build: how many candidates have their verdict, which verdicts, and the step that the
-// present unit is at.
+// Shows the progress of a build: how many candidates have their verdict, the counts of the verdicts, and the
+// current step of the current unit.
 #pragma once
 
 #include <array>
@@ -14,17 +14,17 @@
 
 namespace q3d::pipeline::build {
 
-// The results that a run makes, among those that decide verdicts.
+// The results that a run makes and that decide verdicts.
 struct VerdictSteps {
   bool judges = true;  // false in a run that only predicts
   bool refines = true;
   bool measures = true;  // guards and trust may drop what the rule keeps
 };
 
-// A candidate counts as done when no later step of the run can change its verdict: a failed or hopeless one
+// A candidate counts as done when no later step of the run can change its verdict: a failed or discarded one
 // after its prediction, an adapted one after its adaptation, and a label that is measured after that. So the
-// bar moves after each batch, and the counts of the verdicts add up to what is done. All but others() are
-// called on the device's thread alone.
+// bar moves after each batch, and the counts of the verdicts add up to the number of candidates done. All
+// functions but others() are called on the device's thread only.
 class UnitProgress : public unit::StepObserver {
  public:
   UnitProgress(const config::JudgingRules& rules, VerdictSteps steps, std::int64_t candidates,
@@ -36,11 +36,12 @@ class UnitProgress : public unit::StepObserver {
   void batch_done(const unit::UnitWork& work, std::string_view step, std::size_t done,
                   std::size_t total) override;
 
-  // Counts the unit by its final judgements. `from_earlier_run`: nothing of it was computed in this run.
+  // Counts the unit by its final judgements. `from_earlier_run` says that nothing of it was computed in this
+  // run.
   void finish(const unit::UnitWork& work, bool from_earlier_run);
 
   using Counts = std::array<std::int64_t, 4>;  // by manifests::Verdict
-  // Takes over the counts of what other processes have finished by now. May be called on any thread.
+  // Sets the counts of the units that other processes have finished so far. May be called on any thread.
   void others(const Counts& counts);
   static Counts counts_of(const unit::UnitWork& work);
 
@@ -51,12 +52,12 @@ class UnitProgress : public unit::StepObserver {
   const config::JudgingRules& rules_;
   VerdictSteps steps_;
   std::int64_t units_;
-  std::mutex mutex_;       // guards what follows
+  std::mutex mutex_;       // guards the members below
   Counts others_{};        // of the units of other processes
-  Counts finished_{};      // of the units that are through
-  Counts present_{};       // of the present unit, so far
-  std::int64_t told_ = 0;  // candidates of the present unit that progress_ counts as done
-  std::string step_;       // of the present unit
+  Counts finished_{};      // of the finished units
+  Counts present_{};       // of the current unit so far
+  std::int64_t told_ = 0;  // candidates of the current unit that progress_ counts as done
+  std::string step_;       // step of the current unit
   run::Progress progress_;
 };
 

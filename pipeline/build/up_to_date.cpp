@@ -31,8 +31,8 @@ using nlohmann::json;
 constexpr int kForm = 2;  // of the record
 constexpr std::size_t kFilesAtOnce = 16'384;
 constexpr std::size_t kMostEntries = 20'000'000;
-// Stamps of one tick of the file system's clock do not tell two writes apart. Linux ticks every 10 ms or
-// faster; a time in whole seconds comes from a file system that has no finer ones.
+// Two writes within one tick of the file system's clock have the same stamp. Linux ticks every 10 ms or
+// faster; a time in whole seconds comes from a file system without finer times.
 constexpr std::int64_t kTickNs = 50'000'000;
 constexpr std::int64_t kCoarseTickNs = 2'000'000'000;
 
@@ -86,7 +86,7 @@ bool add_program(PathTable& paths) {
   return true;
 }
 
-// Changes of these bring pictures to light or hide them.
+// Adds folders in which a picture could appear or disappear.
 bool add_folders(PathTable& paths, const fs::path& folder, const fs::path& except) {
   if (folder.empty()) return true;
   const auto found = folders_below(fs::absolute(folder).lexically_normal(), except, kMostEntries);
@@ -98,18 +98,18 @@ bool add_folders(PathTable& paths, const fs::path& folder, const fs::path& excep
 std::vector<std::string> published_files(const fs::path& folder) {
   std::vector<std::string> paths{(folder / "dataset.json").string(), (folder / "verdicts.csv").string()};
   for (const auto& entry : fs::directory_iterator(folder / "shards")) paths.push_back(entry.path().string());
-  paths.push_back((folder / "shards").string());  // tells of files that are added or removed
+  paths.push_back((folder / "shards").string());  // its stamp changes if files are added or removed
   return paths;
 }
 
-// Waits until a further write would get a later stamp.
+// Waits until another write would get a later stamp.
 void let_clock_tick(const std::vector<StampedFile>& files) {
   const std::int64_t newest = newest_change_ns(files);
   const std::int64_t wait = newest + tick_of(newest) - now_ns();
   if (wait > 0 && wait <= kCoarseTickNs) std::this_thread::sleep_for(std::chrono::nanoseconds(wait));
 }
 
-// The text of a record, which ends with a line that has the digest of all before it.
+// Writes the text of a record. Its last line holds the digest of everything before it.
 class RecordWriter {
  public:
   explicit RecordWriter(const fs::path& file) : file_(file) {}
@@ -118,7 +118,7 @@ class RecordWriter {
     digest_.update(std::as_bytes(std::span(text)));
     file_.write(text);
   }
-  // Returns false if a path fits no line.
+  // Returns false if a path cannot be written as a line.
   bool write(std::span<const StampedFile> files) {
     std::string text;
     const bool fits = stamps_.append(files, text);
@@ -136,7 +136,7 @@ class RecordWriter {
   StampWriter stamps_;
 };
 
-// Gives the lines of a record but the last.
+// Reads the lines of a record except the last.
 class RecordReader {
  public:
   explicit RecordReader(const fs::path& file) : lines_(file) { advance(); }
@@ -154,7 +154,7 @@ class RecordReader {
     line.pop_back();
     return line;
   }
-  // Once all lines were given: whether the last has the digest of the others.
+  // Returns, after all lines were read, whether the last line has the digest of the others.
   bool is_sound() { return lines_.was_whole() && last_ == digest_.hex(); }
 
  private:
@@ -169,7 +169,7 @@ class RecordReader {
   manifests::Sha256 digest_;
 };
 
-// Whether every file of the record's remaining lines has its stamp.
+// Returns whether every file of the record's remaining lines has its stamp.
 bool has_all_stamps(RecordReader& record) {
   StampReader stamps;
   std::vector<StampedFile> files;
@@ -184,7 +184,7 @@ bool has_all_stamps(RecordReader& record) {
   return true;
 }
 
-// The result that a record's head states. Throws json::exception for anything else.
+// Returns the result that a record's head states. Throws json::exception for any other text.
 UpToDateRecord::Unchanged result_in(const std::string& head, const fs::path& out) {
   const json said = json::parse(head);
   UpToDateRecord::Unchanged found{out / said.at("folder").get<std::string>(),
@@ -240,7 +240,7 @@ std::optional<PathTable> UpToDateRecord::inputs(const candidates::Ingest& ingest
   for (const config::DatasetConfig& dataset : config_.datasets) {
     for (const fs::path& file :
          {dataset.annotations, dataset.topology, dataset.curation, dataset.body_model}) {
-      if (!file.empty()) add(paths, dataset.root / file);  // an absolute path stays as it is
+      if (!file.empty()) add(paths, dataset.root / file);  // an absolute path is unchanged
     }
     for (const fs::path& world : {dataset.root, dataset.root.parent_path()}) add(paths, world / "world.json");
     if (!add_folders(paths, dataset.root, except)) return std::nullopt;
@@ -281,7 +281,7 @@ void UpToDateRecord::keep(const candidates::Ingest& ingest, const fs::path& fold
     newest = std::max(newest, newest_change_ns(files));
     if (!record.write(files)) return;
   }
-  if (newest + tick_of(newest) > begun_ns_) return;  // a later build leaves the record
+  if (newest + tick_of(newest) > begun_ns_) return;  // a later build will write the record
   const std::vector<StampedFile> published = stamp_files(published_files(folder));
   let_clock_tick(published);
   if (!have_stamps(published) || !record.write(published)) return;

@@ -1,10 +1,10 @@
-// Says whether a build has nothing to do, without reading what it would read.
+// Says whether a build has nothing to do, without reading its inputs.
 //
 // A build that ends with a finished dataset leaves a record, <out>/stages/builds/<digest of the
-// request>.stamps: the stamps of all that it read (pictures, masks, annotation files, weights, the program
-// itself), of every folder in which a picture could appear, and of the dataset's own files, at the moment
-// when their bytes were compared with their digests. As long as all stamps are the same, the same request
-// would end with the same dataset.
+// request>.stamps: the stamps of everything that it read (pictures, masks, annotation files, weights, the
+// program itself), of every folder in which a picture could appear, and of the dataset's own files, at the
+// moment when their bytes were compared with their digests. As long as all stamps are the same, the same
+// request would end with the same dataset.
 #pragma once
 
 #include <cstdint>
@@ -22,8 +22,8 @@ namespace q3d::pipeline::build {
 
 class UpToDateRecord {
  public:
-  // The record of the request that this config makes on this device. Later calls say what was true at this
-  // moment or before it.
+  // The record of the request that this config makes on this device. Later calls refer to the state at the
+  // time of construction or before.
   UpToDateRecord(const std::filesystem::path& out, const config::BuildConfig& config,
                  const config::JudgingRules& rules, const std::string& device_key);
 
@@ -33,13 +33,13 @@ class UpToDateRecord {
     std::int64_t candidates = 0;
     std::int64_t units = 0;
   };
-  // Returns what the request ends with if nothing has changed. A damaged record counts as none. Throws
+  // Returns the result of the request if nothing has changed. A damaged record counts as none. Throws
   // manifests::IoError.
   std::optional<Unchanged> unchanged() const;
 
-  // Keeps the stamps, if they can be trusted: no input was changed since this object was made. A build whose
-  // datasets are compared with test sets has no record. `folder` holds the finished dataset; its bytes were
-  // just compared or written. Throws manifests::IoError.
+  // Stores the stamps, if they can be trusted, which means that no input was changed since this object was
+  // made. A build whose datasets are compared with test sets has no record. `folder` holds the finished
+  // dataset; its bytes were just compared or written. Throws manifests::IoError.
   void keep(const candidates::Ingest& ingest, const std::filesystem::path& folder) const;
 
  private:

@@ -65,7 +65,7 @@ Workspace::Workspace(const config::BuildConfig& config, const run::RunOptions& o
       device_key_(config::needs_network(config) ? network::device_key(config.network) : std::string()),
       origins_(read_origins(config)),
       ingest_(candidates::ingest(config, digests_, network::load_body_meshes, scratch())) {
-  if (!scratch_) manifests::remove_temporaries(options.out);  // what a run that was killed left
+  if (!scratch_) manifests::remove_temporaries(options.out);  // of a killed run
   leakage::leave_out(config, digests_, scratch(), options.quiet, ingest_);
   log_candidates(static_cast<std::int64_t>(ingest_.candidates.size()),
                  static_cast<std::int64_t>(ingest_.units.size()), options_.quiet);

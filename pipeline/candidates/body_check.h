@@ -1,5 +1,4 @@
-// Some files state a body twice. This compares their 3D keypoints with those of the body that their pose and
-// shape make.
+// Some files state a body twice, as pose and shape and as 3D keypoints. This check compares the two.
 #pragma once
 
 #include <cstddef>
@@ -11,16 +10,16 @@
 
 namespace q3d::pipeline::candidates {
 
-// A difference that rounding in a file does not explain.
+// Rounding in a file does not explain a larger difference.
 inline constexpr double kLargestKeypointDifferenceMm = 1.0;
 
 struct BodyCheck {
   std::size_t compared = 0;  // records with pose, shape and 3D keypoints
-  std::size_t apart = 0;     // of these, by more than kLargestKeypointDifferenceMm
+  std::size_t apart = 0;     // of these, records that differ by more than kLargestKeypointDifferenceMm
   double largest_mm = 0.0;
   std::string largest_id;
   std::size_t filled = 0;             // records without 3D keypoints, which now have the body's
-  std::vector<std::string> findings;  // of every record, for people; empty where there is nothing to tell
+  std::vector<std::string> findings;  // one for each record, for people; empty if there is nothing to report
 };
 
 // Poses every usable record's body without its translation and compares its 26 keypoints with the file's,
@@ -30,14 +29,14 @@ struct BodyCheck {
 BodyCheck check_bodies(const device::BodyMeshes& bodies, bool take_body,
                        std::vector<manifests::SampleRecord>& records);
 
-// Returns how many of the first records make one call of the body model, since the last bits of a mesh may
-// depend on the others that are posed with it: up to the one that fills the call, or 0 if these do not.
+// Returns how many of the first records fill one call of the body model, or 0 if there are too few. Calls are
+// always full because the last bits of a mesh may depend on the meshes that are posed with it.
 std::size_t records_of_one_call(const std::vector<manifests::SampleRecord>& records);
 
-// Adds what was found in further records, without their findings.
+// Adds the counts of further records, but not their findings.
 void add(const BodyCheck& further, BodyCheck& check);
 
-// One line for the run's notes.
+// Returns one line for the run's notes.
 std::string to_note(const BodyCheck& check);
 
 }  // namespace q3d::pipeline::candidates

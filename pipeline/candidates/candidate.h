@@ -8,7 +8,7 @@
 
 namespace q3d::pipeline::candidates {
 
-// The reason why a candidate is left out, whatever its prediction.
+// The reason why a candidate is left out, independent of its prediction.
 struct Exclusion {
   manifests::Reason reason = manifests::Reason::none;
   std::string detail;  // for people
@@ -16,10 +16,10 @@ struct Exclusion {
 
 struct Candidate {
   manifests::SampleRecord record;
-  std::string image_sha256;                  // empty when the picture is not there
-  std::string mask_sha256;                   // empty when there is none, or its file is not there
-  config::Role role = config::Role::pseudo;  // its dataset's
-  std::string finding;  // of the check of its body, for people; empty where there is nothing to tell
+  std::string image_sha256;                  // empty if the picture does not exist
+  std::string mask_sha256;                   // empty if there is no mask, or its file does not exist
+  config::Role role = config::Role::pseudo;  // the role of its dataset
+  std::string finding;                       // result of the check of its body, for people; may be empty
   Exclusion exclusion{};
 };
 

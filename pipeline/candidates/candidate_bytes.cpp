@@ -5,7 +5,7 @@
 namespace q3d::pipeline::candidates {
 namespace {
 
-// Every member but the truth and the exclusion, once for writing and reading.
+// Visits every member except truth and exclusion, so that writing and reading share one list.
 template <typename SomeCandidate, typename Visitor>
 void visit(SomeCandidate& candidate, Visitor& visitor) {
   auto& record = candidate.record;

@@ -1,4 +1,4 @@
-// Candidates as bytes, for a file that lives no longer than its process.
+// Converts candidates to bytes and back, for a file that lives no longer than its process.
 #pragma once
 
 #include <cstddef>
@@ -9,10 +9,10 @@
 
 namespace q3d::pipeline::candidates {
 
-// Appends all of the candidate but its exclusion, bit for bit.
+// Appends the candidate without its exclusion, bit for bit.
 void append_bytes(const Candidate& candidate, std::vector<std::byte>& bytes);
 
-// Takes the first candidate off the bytes. Throws std::out_of_range if they end within it.
+// Reads the first candidate and removes it from the bytes. Throws std::out_of_range if they end within it.
 Candidate take_candidate(std::span<const std::byte>& bytes);
 
 }  // namespace q3d::pipeline::candidates

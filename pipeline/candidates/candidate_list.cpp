@@ -8,10 +8,10 @@
 namespace q3d::pipeline::candidates {
 namespace {
 
-// Candidates of one read of for_each().
+// The number of candidates that for_each() reads at once.
 constexpr std::size_t kBlock = 512;
 
-// Applies what was set for the candidates of a part of the list.
+// Applies the values that were set later to the candidates of a part of the list.
 template <typename Values, typename Set>
 void apply(const Values& values, std::size_t first, std::vector<Candidate>& part, Set set) {
   for (auto value = values.lower_bound(first); value != values.end() && value->first < first + part.size();

@@ -1,4 +1,4 @@
-// The candidates of a run, in order. They lie on disk, so that their number is not bounded by memory.
+// The candidates of a run, in order. They are kept on disk, so that memory does not limit their number.
 #pragma once
 
 #include <cstddef>
@@ -17,12 +17,13 @@
 
 namespace q3d::pipeline::candidates {
 
-// In memory, a candidate takes the eight bytes of its place, and what was set after it was appended. Reading
-// is thread-safe; all else needs a thread of its own. Members that reach the disk throw manifests::IoError.
+// In memory, a candidate takes eight bytes for its position in the file, plus the values that were set after
+// it was appended. Reading is thread-safe; all other calls must come from one thread, while no other thread
+// reads. Members that access the disk throw manifests::IoError.
 class CandidateList {
  public:
-  // Candidates go to a file without a name in `folder` (manifests/spill_file.h), which is made with the first
-  // of them.
+  // Candidates go to a file without a name in `folder` (manifests/spill_file.h), which is made when the first
+  // one is appended.
   explicit CandidateList(std::filesystem::path folder = ".") : folder_(std::move(folder)) {}
 
   void append(std::span<const Candidate> candidates);

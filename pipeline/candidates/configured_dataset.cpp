@@ -35,7 +35,7 @@ void complete_species(const std::string& listed, manifests::SampleRecord& record
   }
 }
 
-// The choice of a curation list.
+// The pictures that a curation list chose.
 class Choice {
  public:
   explicit Choice(const config::DatasetConfig& options)
@@ -59,7 +59,7 @@ class Choice {
     return kept;
   }
 
-  // Once all records are through: refuses a list of other files, and tells of the choice.
+  // Call this after all records. It refuses a list that was made for other files, and notes the choice.
   void finish(Dataset& dataset) const {
     for (const auto& [picture, species] : chosen_) {
       if (seen_.contains(picture)) continue;

@@ -1,4 +1,4 @@
-// A dataset as the config names it: its format's records, or those that a curation list chose.
+// Loads a dataset of the config: all records of its files, or those that a curation list chose.
 #pragma once
 
 #include "loaders/formats/dataset.h"
@@ -12,7 +12,7 @@ namespace q3d::pipeline::candidates {
 // and for a list that is malformed, of another split, or of other annotation files. Throws std::runtime_error
 // as loaders::load_dataset does.
 loaders::formats::Dataset load_configured(const config::DatasetConfig& options);
-// The same, part by part (loaders::formats::stream_dataset): the dataset that is returned has no records.
+// Loads the dataset in parts (loaders::formats::stream_dataset). The returned dataset has no records.
 loaders::formats::Dataset stream_configured(const config::DatasetConfig& options,
                                             const loaders::formats::TakeRecords& take);
 

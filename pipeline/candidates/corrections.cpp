@@ -41,7 +41,7 @@ const std::vector<std::string>& names() {
   return all;
 }
 
-// Returns false if the cells are no point.
+// Returns false if the cells do not describe a point.
 bool read_point(const std::vector<std::string>& cells, CorrectedPoint& point) {
   if (cells.size() != kCells || cells[0].empty()) return false;
   const auto found = std::find(names().begin(), names().end(), cells[1]);

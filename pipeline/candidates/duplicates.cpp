@@ -33,7 +33,7 @@ bool is_same_box(const manifests::Box& a, const manifests::Box& b) {
          std::abs(a.w_px - b.w_px) <= kRoundingPx && std::abs(a.h_px - b.h_px) <= kRoundingPx;
 }
 
-// A candidate, reduced to the values that decide whether two of one picture are one animal.
+// A candidate, reduced to the values that decide whether two candidates of one picture are the same animal.
 struct Animal {
   std::size_t index = 0;  // of the candidate
   config::Role role = config::Role::pseudo;
@@ -62,8 +62,8 @@ bool is_same_animal(const Animal& a, const Animal& b) {
          std::equal(a.keypoints.begin(), a.keypoints.end(), b.keypoints.begin(), is_same_point);
 }
 
-// Whether two samples of one picture look like labels of one animal by two people: most of the keypoints that
-// both have lie within a twentieth of the box's longer side.
+// Returns whether two samples of one picture look like labels of one animal by two people: for most keypoints
+// that both have, the distance is below a twentieth of the box's longer side.
 bool is_nearly_same_animal(const Animal& a, const Animal& b) {
   constexpr double kNear = 0.05;
   constexpr int kFewest = 3;
@@ -77,11 +77,11 @@ bool is_nearly_same_animal(const Animal& a, const Animal& b) {
     if ((both >> i & 1U) == 0) continue;
     const double dx = a.keypoints[i].x_px - b.keypoints[i].x_px;
     const double dy = a.keypoints[i].y_px - b.keypoints[i].y_px;
-    // Most points lie apart, which one coordinate shows.
+    // Most points lie far apart, which one coordinate already shows.
     const bool is_near =
         std::abs(dx) <= reach_px && std::abs(dy) <= reach_px && std::hypot(dx, dy) <= reach_px;
     apart += is_near ? 0 : 1;
-    if (2 * apart >= common) return false;  // most are no longer near
+    if (2 * apart >= common) return false;  // most cannot be near any more
   }
   return true;
 }
@@ -90,7 +90,7 @@ bool is_nearly_same_animal(const Animal& a, const Animal& b) {
 struct Repeated {
   std::size_t count = 0;
   std::size_t first = 0;  // the first of them
-  std::size_t of = 0;     // the one that it repeats
+  std::size_t of = 0;     // the candidate that it repeats
 
   void add(std::size_t index, std::size_t repeats) {
     if (count++ > 0 && index > first) return;
@@ -106,7 +106,7 @@ class PictureGroups {
  public:
   explicit PictureGroups(CandidateList& candidates) : candidates_(candidates) {}
 
-  // `group` holds places of candidates whose pictures' digests begin alike.
+  // `group` holds the positions of candidates whose pictures' digests have the same first digits.
   void add(const std::vector<std::size_t>& group) {
     std::map<std::string, std::vector<Animal>> kept;  // by the whole digest
     for (const std::size_t index : group) {

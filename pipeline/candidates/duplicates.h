@@ -1,4 +1,5 @@
-// Animals that a pool holds several times: two files of the same labels, or one annotation twice.
+// Finds animals that a pool holds several times, because two files have the same labels or one annotation
+// occurs twice.
 #pragma once
 
 #include <compare>
@@ -15,8 +16,8 @@ namespace q3d::pipeline::candidates {
 // Candidates of different roles are not compared: a pool may hold an animal's own label and its pseudo label.
 class Duplicates {
  public:
-  // Notes a usable candidate with a picture, by the picture's digest. Every candidate must be given, in
-  // order.
+  // Remembers the candidate by its picture's digest if it is usable and has a picture. Every candidate must
+  // be added, in order.
   void add(std::size_t index, const Candidate& candidate);
 
   // Fails every candidate as `duplicate` whose picture has the bytes of an earlier candidate's and whose

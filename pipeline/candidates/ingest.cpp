@@ -32,7 +32,7 @@ namespace {
 
 using manifests::Reason;
 
-// One file's own digest, or one over the digests of several.
+// Returns the digest of a single file, or a digest over the digests of several files.
 std::string digest_files(const std::vector<std::filesystem::path>& files, manifests::DigestCache& digests) {
   if (files.size() == 1) return digests.digest(files.front());
   std::string text;
@@ -40,8 +40,8 @@ std::string digest_files(const std::vector<std::filesystem::path>& files, manife
   return manifests::sha256(text);
 }
 
-// Finds ids that occur twice. It holds a hash of 64 bits of every id; ids of one hash are compared
-// themselves.
+// Finds ids that occur twice. It holds a 64-bit hash of every id; ids with equal hashes are compared as
+// texts.
 class UniqueIds {
  public:
   void add(std::size_t index, const std::string& id) {
@@ -82,7 +82,7 @@ std::string note_of(const Corrections& corrections, const std::filesystem::path&
       corrections.points.size() - corrections.matched);
 }
 
-// A label must have what its role promises.
+// Fails a record without the label that its role requires.
 void check_role(config::Role role, manifests::SampleRecord& record) {
   if (role != config::Role::truth || record.failure != Reason::none) return;
   if (record.truth && record.truth->has_pose) return;
@@ -91,8 +91,8 @@ void check_role(config::Role role, manifests::SampleRecord& record) {
       "pose: got nothing, or zeros throughout; expected 35 rotations, since the dataset's role is \"truth\"";
 }
 
-// A picture that is not there is a failed sample, never a failed build; a mask is then none. A file that is
-// there and cannot be read stops the run.
+// Digests pictures and masks. A missing picture fails its sample, never the build; a missing mask counts as
+// no mask. A file that exists and cannot be read stops the run.
 void digest_pictures(std::span<Candidate> candidates, manifests::DigestCache& digests) {
   tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t i) {
     Candidate& candidate = candidates[i];
@@ -158,7 +158,7 @@ std::vector<Unit> cut_units(const CandidateList& candidates, const config::Build
   return units;
 }
 
-// Searches that go over the candidates of all datasets.
+// The searches that need the candidates of all datasets.
 struct Searches {
   UniqueIds ids;
   Duplicates duplicates;
@@ -167,7 +167,7 @@ struct Searches {
 // Takes the records of one dataset, part by part, and appends them to the candidates.
 class DatasetIntake {
  public:
-  // Without `bodies`, records keep what the file says. All references must outlive it.
+  // Without `bodies`, records keep the file's bodies unchecked. All references must outlive this object.
   DatasetIntake(const config::DatasetConfig& options, std::unique_ptr<device::BodyMeshes> bodies,
                 manifests::DigestCache& digests, Searches& searches, Ingest& ingest)
       : options_(options),
@@ -189,7 +189,7 @@ class DatasetIntake {
     while (const std::size_t count = records_of_one_call(waiting_)) check_and_append(count);
   }
 
-  // Once all records are through.
+  // Call this after all records.
   void finish(loaders::formats::Dataset& dataset) {
     if (!bodies_) return;
     check_and_append(waiting_.size());
@@ -227,7 +227,7 @@ class DatasetIntake {
   manifests::DigestCache& digests_;
   Searches& searches_;
   Ingest& ingest_;
-  std::vector<manifests::SampleRecord> waiting_;  // for the body model
+  std::vector<manifests::SampleRecord> waiting_;  // records that wait for a full call of the body model
   BodyCheck check_;
 };
 
@@ -309,7 +309,7 @@ Ingest ingest(const config::BuildConfig& config, manifests::DigestCache& digests
   }
   searches->ids.require(result.candidates);
   searches->duplicates.fail(result.candidates, result.notes);
-  searches.reset();  // their memory is needed no more
+  searches.reset();  // frees their memory
   digests.save();
   result.units = cut_units(result.candidates, config);
   return result;

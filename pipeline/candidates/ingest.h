@@ -1,4 +1,4 @@
-// Ingest: annotation files -> the ordered list of candidates, each with the digest of its picture.
+// Ingest turns annotation files into the ordered list of candidates, each with the digest of its picture.
 #pragma once
 
 #include <cstdint>
@@ -21,7 +21,8 @@
 
 namespace q3d::pipeline::candidates {
 
-// A fixed run of candidates in ingest order: the grain of resume and of determinism. It becomes one shard.
+// A fixed run of consecutive candidates in ingest order. A build resumes unit by unit, batches never cross a
+// unit, and each unit becomes one shard.
 struct Unit {
   std::int64_t index = 0;
   std::size_t first = 0;  // into Ingest::candidates
@@ -37,14 +38,14 @@ struct LeakageSummary {
   std::map<std::string, std::string> test_sets;  // "name/split" -> SHA-256 of its annotation files
   std::size_t test_pictures = 0;
   std::size_t excluded = 0;   // candidates
-  std::size_t groups = 0;     // of pictures of the pool that look alike
+  std::size_t groups = 0;     // groups of pictures of the pool that look alike
   std::size_t in_groups = 0;  // pictures
 };
 
-// A remark that a person should know about a dataset, or about the whole pool.
+// A remark for the user about a dataset, or about the whole pool.
 struct IngestNote {
   loaders::formats::NoteKind kind = loaders::formats::NoteKind::remark;
-  std::string dataset;  // "name/split"; empty where it concerns the pool
+  std::string dataset;  // "name/split"; empty if it concerns the pool
   std::string text;
 
   std::string line() const { return dataset.empty() ? text : dataset + ": " + text; }
@@ -54,23 +55,23 @@ struct Ingest {
   CandidateList candidates;  // dataset order of the config, then file order
   std::vector<Unit> units;
   std::map<std::string, std::string> annotation_digests;  // "name/split" -> SHA-256 of its annotation files
-  std::vector<std::filesystem::path> files;               // that were read, beside pictures and masks
-  std::set<std::string> rendered;  // "name/split" of those whose pictures `sample` rendered
+  std::vector<std::filesystem::path> files;               // files that were read, except pictures and masks
+  std::set<std::string> rendered;                         // "name/split" of datasets that `sample` rendered
   std::vector<IngestNote> notes;
-  std::optional<Corrections> corrections;  // their points are in the records
+  std::optional<Corrections> corrections;  // already applied to the records
 
-  // Set by leave_out (pipeline/leakage/exclusions.h).
+  // Set by leave_out() (pipeline/leakage/exclusions.h).
   std::optional<Veto> veto;
   std::optional<LeakageSummary> leakage;
 };
 
 // Loads every dataset, compares the labels with the pictures' headers, and digests every picture (in
-// parallel; unchanged files come from the cache). A record whose role asks for a body and that gives no pose
-// is failed, and so is one that repeats an earlier one (duplicates.h). Throws std::runtime_error for an
-// annotation file that cannot be read, manifests::IoError for a picture or mask that is there and cannot be
-// read, and Interrupted. `load_bodies` is called for datasets with a body model;
-// an empty one leaves their bodies unchecked, for callers that look at pictures alone. The candidates lie in
-// a file without a name in `folder`.
+// parallel; unchanged files come from the cache). A record without a pose fails if its role needs a body, and
+// so does one that repeats an earlier one (duplicates.h). Throws std::runtime_error for an annotation file
+// that cannot be read, manifests::IoError for a picture or mask that exists and cannot be read, and
+// Interrupted. `load_bodies` is called for datasets with a body model; if it is empty, bodies are not
+// checked, which suits callers that need only pictures. The candidates lie in a file without a name in
+// `folder`.
 Ingest ingest(const config::BuildConfig& config, manifests::DigestCache& digests,
               const device::BodyMeshesLoader& load_bodies, const std::filesystem::path& folder);
 
@@ -78,17 +79,19 @@ Ingest ingest(const config::BuildConfig& config, manifests::DigestCache& digests
 // the one above it holds the world's world.json. Pictures without this mark count as photographs.
 bool is_rendered(const std::filesystem::path& root);
 
-// Returns a dataset's name and split as one word, "name/split": the key of whatever is listed by dataset.
+// Returns a dataset's name and split as "name/split". This is the key of everything that is listed by
+// dataset.
 std::string dataset_key(const manifests::SampleRecord& record);
 
-// One dataset as ingest reads it: the chosen records where it is curated, compared with their pictures
-// (picture_fit.h), without this machine's paths, and the digest of its annotation files and that choice.
+// One dataset as ingest reads it. If it is curated, it has the chosen records only. They were compared with
+// their pictures (picture_fit.h), and this machine's paths were removed. The digest covers its annotation
+// files and the choice.
 struct IngestedDataset {
   loaders::formats::Dataset dataset;
   std::string annotations_sha256;
 };
 IngestedDataset read_dataset(const config::DatasetConfig& options, manifests::DigestCache& digests);
-// The same, part by part (loaders::formats::stream_dataset): `dataset` has no records.
+// Reads a dataset in parts (loaders::formats::stream_dataset). `dataset` has no records.
 IngestedDataset stream_dataset(const config::DatasetConfig& options, manifests::DigestCache& digests,
                                const loaders::formats::TakeRecords& take);
 

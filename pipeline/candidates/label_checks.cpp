@@ -14,10 +14,10 @@ using manifests::Reason;
 using manifests::SampleRecord;
 
 constexpr double kSlackPx = 2.0;
-constexpr double kBoxSlack = 0.1;       // of the box's longer side; annotators draw boxes and points apart
-constexpr double kSmallestBoxPx = 5.0;  // of the longer side
+constexpr double kBoxSlack = 0.1;       // of the longer side; annotators draw boxes and points separately
+constexpr double kSmallestBoxPx = 5.0;  // least length of the longer side
 constexpr double kLargestFraction = 1.0 + 1e-6;
-constexpr double kFractionReach = 1.5;  // of normalised keypoints from the middle, 0.5
+constexpr double kFractionReach = 1.5;  // largest distance of normalised keypoints from the middle, 0.5
 constexpr double kOnePlacePx = 1.0;
 
 bool is_visible(const Keypoint& point) {
@@ -63,7 +63,7 @@ int keypoints_outside(const SampleRecord& record, int width_px, int height_px) {
 
 std::optional<LabelProblem> find_label_problem(const SampleRecord& record, int width_px, int height_px) {
   const auto visible = std::count_if(record.keypoints.begin(), record.keypoints.end(), is_visible);
-  // Points of an animal that is cut off by the border lie a little beside 0 to 1.
+  // Points of an animal that the border cuts off lie a little outside 0 to 1.
   const bool are_fractions =
       visible > 1 && std::all_of(record.keypoints.begin(), record.keypoints.end(), [](const Keypoint& point) {
         return !is_visible(point) ||

@@ -1,5 +1,5 @@
-// Labels that cannot be meant: fractions instead of pixels, points beside their picture, boxes of a few
-// pixels.
+// Finds labels that are surely wrong: fractions instead of pixels, points outside their picture, boxes of a
+// few pixels.
 #pragma once
 
 #include <optional>
@@ -15,7 +15,7 @@ struct LabelProblem {
 };
 
 // Checks the visible keypoints and the box of a record against the size of its picture. Returns nothing if
-// they can be meant: single keypoints may lie outside the picture or the box.
+// they are plausible; single keypoints may lie outside the picture or the box.
 std::optional<LabelProblem> find_label_problem(const manifests::SampleRecord& record, int width_px,
                                                int height_px);
 

@@ -1,4 +1,4 @@
-// Text files in which a person lists samples, one a line: vetoes and corrected keypoints.
+// Reads text files in which a person lists samples, one on each line: vetoes and corrected keypoints.
 #pragma once
 
 #include <filesystem>
@@ -18,8 +18,8 @@ struct ListFile {
   std::vector<ListLine> lines;  // without empty lines, lines that begin with '#', and a '\r' at the end
 };
 
-// Throws ConfigError that begins with `what` if the path names no file, and manifests::IoError if a file is
-// there and cannot be read.
+// Reads the lines of a file. Throws ConfigError that begins with `what` if the path names no file, and
+// manifests::IoError if the file exists and cannot be read.
 ListFile read_list_file(const std::filesystem::path& file, std::string_view what);
 
 }  // namespace q3d::pipeline::candidates

@@ -38,7 +38,7 @@ bool agrees(const Size& stated, const Size& size) {
          (stated.height_px == 0 || stated.height_px == size.height_px);
 }
 
-// Returns the factor by which a picture was resized: both sides agree with it to a pixel.
+// Returns the factor by which a picture was resized, if both sides agree with it to a pixel.
 std::optional<double> uniform_factor(const Size& from, const Size& to) {
   if (from.width_px == 0 || from.height_px == 0) return std::nullopt;
   const double longer_from = std::max(from.width_px, from.height_px);
@@ -141,7 +141,8 @@ class HeaderFit {
     return false;
   }
 
-  // COCO's tools measure from the corner of the first pixel, so that resizing a picture scales coordinates.
+  // Scales box and keypoints. COCO's tools measure from the corner of the first pixel, so resizing a picture
+  // only scales coordinates.
   void scale(SampleRecord& record, double factor) {
     record.scale = factor;
     record.box = {record.box.x_px * factor, record.box.y_px * factor, record.box.w_px * factor,

@@ -1,4 +1,4 @@
-// Compares what annotation files say of their pictures with the pictures themselves.
+// Compares the statements of annotation files about their pictures with the pictures themselves.
 #pragma once
 
 #include <vector>
@@ -24,16 +24,16 @@ namespace q3d::pipeline::candidates {
 //   keypoints. It keeps its reason unless its picture is too large or has another size. Other failed records
 //   stay as they are.
 // The notes say how many pictures have an EXIF orientation that is not used, how many records were scaled,
-// and how many have keypoints outside their picture. Records of pictures without a readable header stay as
-// they are: decoding tells what is wrong. Throws manifests::IoError for a picture that is there and cannot be
-// read, and Interrupted.
+// and how many have keypoints outside their picture. Records of pictures without a readable header are
+// unchanged; decoding reports what is wrong. Throws manifests::IoError for a picture that exists and cannot
+// be read, and Interrupted.
 class PictureFit {
  public:
   // `options` must outlive it.
   explicit PictureFit(const config::DatasetConfig& options) : options_(options) {}
 
   void fit(std::vector<manifests::SampleRecord>& records);
-  // The notes on all records that were fitted so far.
+  // Returns the notes on all records that were fitted so far.
   std::vector<loaders::formats::Note> notes() const { return notes_.list(); }
 
  private:

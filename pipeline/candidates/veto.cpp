@@ -16,7 +16,7 @@ Veto read_veto(const std::filesystem::path& file) {
   for (const auto& [number, line] : list.lines) {
     const std::size_t tab = line.find('\t');
     const std::string id = line.substr(0, tab);
-    // dataset/split/image#annotation
+    // A sample id has the form dataset/split/image#annotation.
     if (std::count(id.begin(), id.end(), '/') < 2 || id.find('#') == std::string::npos) {
       throw run::ConfigError(
           fmt::format("{}: line {}: got \"{}\", expected a sample id as in verdicts.csv, such as "

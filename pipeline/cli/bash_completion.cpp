@@ -54,7 +54,7 @@ std::string names_of_options(const CommandNode& node) {
   std::string text;
   for (const OptionInfo& option : node.options) {
     text += fmt::format("{}{}", text.empty() ? "" : " ",
-                        option.names.back());  // the long one where there are two
+                        option.names.back());  // the long name if there are two
   }
   return text;
 }
@@ -67,7 +67,7 @@ std::string names_of_commands(const CommandNode& node) {
   return text;
 }
 
-// What the script calls a kind of value.
+// Returns the script's name for a kind of value.
 std::string name_of(ValueKind value) {
   switch (value) {
     case ValueKind::file:
@@ -83,7 +83,7 @@ std::string name_of(ValueKind value) {
   return "other";
 }
 
-// The words that may stand where no option's value is expected.
+// Returns the cases for words that may stand where no option's value is expected.
 std::string command_cases(const CommandNode& root, const std::vector<const CommandNode*>& nodes) {
   std::string text = "  case $command in\n";
   for (const CommandNode* node : nodes) {
@@ -100,7 +100,7 @@ std::string command_cases(const CommandNode& root, const std::vector<const Comma
   return text + fmt::format("    help) words=\"{}\" ;;\n  esac\n", names_of_commands(root));
 }
 
-// What may follow an option.
+// Returns the cases for values that may follow an option.
 std::string value_cases(const std::vector<const CommandNode*>& nodes) {
   std::string text = "  case \"$command $prev\" in\n";
   for (const CommandNode* node : nodes) {

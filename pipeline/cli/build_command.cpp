@@ -39,7 +39,7 @@ config::BuildConfig configured(const Arguments& arguments) {
   return config;
 }
 
-// The words that run the whole build again.
+// Returns the words that run the whole build again.
 std::vector<std::string> command_words(const Arguments& arguments) {
   std::vector<std::string> words{"build"};
   const auto add = [&](std::initializer_list<std::string> more) { words.insert(words.end(), more); };
@@ -64,7 +64,7 @@ int run_build(const Arguments& arguments) {
   request.command = command_words(arguments);
   if (!arguments.until.empty()) request.until = stages::stage_from_string(arguments.until);
   const build::BuildSummary summary = build::build(configured(arguments), arguments.run, request);
-  if (summary.rank != 0) return 0;  // rank 0 speaks for all
+  if (summary.rank != 0) return 0;  // rank 0 reports for all
   if (summary.stopped_after) {
     print_stop(summary, arguments.run.out);
   } else {
@@ -77,7 +77,7 @@ int run_build(const Arguments& arguments) {
   return 0;
 }
 
-// Ways to run less than the whole build.
+// Declares the options that run less than the whole build.
 void partial_options(CLI::App& command, Arguments& arguments) {
   const auto names = stages::stage_names();
   CLI::Option* until =

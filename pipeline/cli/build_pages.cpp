@@ -27,7 +27,7 @@ void print_quality(const dataset::DatasetManifest& manifest) {
   }
 }
 
-// Counts by the enumerators' names.
+// Returns the counts by the enumerators' names.
 template <typename Enum>
 nlohmann::ordered_json to_json(const std::map<Enum, std::int64_t>& counts) {
   nlohmann::ordered_json object = nlohmann::ordered_json::object();

@@ -1,4 +1,4 @@
-// What `build` prints: about a finished dataset, a run that stopped after a stage, and a dry run.
+// Prints the messages of `build` about a finished dataset, a run that stopped after a stage, and a dry run.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -11,11 +11,11 @@
 
 namespace q3d::pipeline::cli {
 
-// On stderr: counts, quality, where the dataset is, and the commands that come next.
+// Prints to stderr the counts, the quality, the dataset's folder, and the commands that come next.
 void print_summary(const build::BuildSummary& summary);
 nlohmann::ordered_json to_json(const build::BuildSummary& summary);
 
-// On stderr, of a summary with `stopped_after`: what is there, and the command that goes on.
+// Prints to stderr, for a summary with `stopped_after`, which results exist and the command that continues.
 void print_stop(const build::BuildSummary& summary, const std::filesystem::path& out);
 nlohmann::ordered_json stop_json(const build::BuildSummary& summary, const std::filesystem::path& out);
 

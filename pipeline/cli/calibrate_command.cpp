@@ -124,7 +124,7 @@ Command add_calibrate(CLI::App& app) {
   return [arguments] {
     const build::CalibrationSummary summary = build::calibrate(
         config::load_build_config(arguments->config.files, arguments->config.settings()), arguments->run);
-    if (summary.rank != 0) return 0;  // rank 0 speaks for all
+    if (summary.rank != 0) return 0;  // rank 0 reports for all
     if (!arguments->write.empty()) build::write_thresholds(arguments->write, summary);
     if (!arguments->figure.empty()) {
       manifests::write_file_atomically(arguments->figure, report::calibration_figure(summary.pools));

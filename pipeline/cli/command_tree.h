@@ -13,11 +13,11 @@ namespace q3d::pipeline::cli {
 enum class ValueKind : std::uint8_t { none, file, folder, word, other };
 
 struct OptionInfo {
-  std::vector<std::string> names;  // "-c", "--config"; of a positional argument its one name
+  std::vector<std::string> names;  // "-c", "--config"; a positional argument has one name
   std::string description;
   ValueKind value = ValueKind::none;
   std::string value_name;          // "FILE", "INT"; empty without a value
-  std::vector<std::string> words;  // that the value may be, of ValueKind::word
+  std::vector<std::string> words;  // allowed values, for ValueKind::word
   std::string default_value;
   bool is_required = false;
   bool repeats = false;  // it may be given several times, or takes several values
@@ -36,7 +36,7 @@ struct CommandNode {
 
 CommandNode command_tree(const CLI::App& app);
 
-// The node and all below it, in the order of a page: each command before its own commands.
+// Returns the node and all nodes below it, each command before its own commands.
 std::vector<const CommandNode*> all_commands(const CommandNode& root);
 
 }  // namespace q3d::pipeline::cli

@@ -15,7 +15,7 @@ namespace q3d::pipeline::cli {
 struct CommandInfo {
   std::string_view name;
   std::string_view description;  // one line of `quadruped3d --help`
-  bool needs_network;  // runs in the program quadruped3d-network, which links LibTorch and knows all commands
+  bool needs_network;            // runs in quadruped3d-network, which links LibTorch and has all commands
   std::string_view network_option{};  // with this option, the command runs there too
 };
 inline constexpr std::array<CommandInfo, 27> kCommands{{
@@ -53,8 +53,7 @@ inline constexpr std::array<CommandInfo, 27> kCommands{{
 // kCommands lacks.
 CLI::App* declare(CLI::App& app, std::string_view name);
 
-// A command that was chosen: runs it and returns the exit code. Throws ConfigError, Interrupted,
-// std::exception.
+// Runs a command that was chosen and returns the exit code. Throws ConfigError, Interrupted, std::exception.
 using Command = std::function<int()>;
 
 Command add_build(CLI::App& app);

@@ -1,4 +1,4 @@
-// Scripts that let a shell complete the program's commands, options and values.
+// Makes scripts with which a shell completes the program's commands, options and values.
 #pragma once
 
 #include <string>
@@ -7,7 +7,7 @@
 
 namespace q3d::pipeline::cli {
 
-// Each returns a whole script for the program `quadruped3d`, however it is started.
+// Each function returns a whole script for the program `quadruped3d`, however it is started.
 std::string bash_completion(const CommandNode& root);
 std::string zsh_completion(const CommandNode& root);  // a file _quadruped3d in $fpath, or sourced
 std::string fish_completion(const CommandNode& root);

@@ -45,7 +45,7 @@ int print_schema(const Arguments& arguments) {
   return 0;
 }
 
-// Compares the page with the settings, or writes its tables anew.
+// Compares the page with the settings, or rewrites its tables.
 int make_tables(const Arguments& arguments) {
   const std::string page = manifests::read_file(arguments.page);
   const config::SettingsTables of_training = training::settings::training_settings_tables();

@@ -36,7 +36,7 @@ void write_paper_tables(const Arguments& arguments, const evaluation::Evaluation
   fmt::print(arguments.json ? stderr : stdout, "\n{}", text);
 }
 
-// The figure of an earlier evaluation does not stay beside tables that it does not show.
+// Writes the figure, or removes that of an earlier evaluation, which would not match the new tables.
 void write_adaptation_figure(const std::filesystem::path& out, const evaluation::Tables& tables) {
   const std::filesystem::path path = out / "adaptation.svg";
   const std::string svg = evaluation::adaptation_figure(tables);

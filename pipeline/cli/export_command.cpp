@@ -51,7 +51,7 @@ int export_here(const Arguments& arguments) {
   return 0;
 }
 
-// Parquet files are written by pyarrow, since Debian 12 has no Arrow for C++.
+// Runs the export in Python: pyarrow writes Parquet files, because Debian 12 has no Arrow for C++.
 int export_in_python(const Arguments& arguments) {
   const PythonCheck check = check_python(arguments.python, "quadruped3d.export.parquet");
   if (!check.has_module) {

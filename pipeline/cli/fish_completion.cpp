@@ -8,7 +8,7 @@
 namespace q3d::pipeline::cli {
 namespace {
 
-// In single quotes of fish.
+// Returns the text in fish's single quotes.
 std::string in_quotes(const std::string& text) {
   std::string result = "'";
   for (const char sign : text) {
@@ -24,7 +24,7 @@ std::string names_of(const std::vector<CommandNode>& commands) {
   return text;
 }
 
-// Whether the words so far name this command: fish code.
+// Returns fish code that tests whether the words so far name this command.
 std::string condition(const CommandNode& node) {
   if (node.path.empty()) return "__fish_use_subcommand";
   std::string text;

@@ -1,4 +1,4 @@
-// `inspect`, in both programs: only the one that can pose bodies draws sheets.
+// `inspect` exists in both programs; only the one that can pose bodies draws sheets.
 #pragma once
 
 #include "pipeline/cli/commands.h"

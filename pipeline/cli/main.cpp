@@ -10,7 +10,7 @@
 
 int main(int argc, char** argv) {
   namespace cli = q3d::pipeline::cli;
-  // `help COMMAND` is answered where the command is.
+  // The program that runs a command also answers `help COMMAND`.
   const std::size_t command = argc > 2 && std::string_view(argv[1]) == "help" ? 2 : 1;
   const auto words = std::span(argv, static_cast<std::size_t>(argc));
   if (words.size() > command && cli::needs_network(words.subspan(command))) {

@@ -9,7 +9,7 @@
 namespace q3d::pipeline::cli {
 namespace {
 
-// Text as troff prints it, sign for sign. Lines that begin with a dot or a quote would be requests.
+// Escapes a text so that troff prints it unchanged. Lines that begin with a dot or a quote would be requests.
 std::string escaped(const std::string& text) {
   std::string result;
   bool is_at_start = true;
@@ -42,7 +42,7 @@ std::string value_of(const OptionInfo& option) {
   return value + (option.repeats ? " ..." : "");
 }
 
-// "[--out TEXT]"; what is required stands without brackets.
+// Returns the synopsis, such as "[--out TEXT]". Required options have no brackets.
 std::string synopsis_of(const CommandNode& node) {
   std::string text = fmt::format("quadruped3d {}", fmt::join(node.path, " "));
   for (const OptionInfo& positional : node.positionals) {

@@ -23,12 +23,13 @@ namespace fs = std::filesystem;
 constexpr const char* kName = "quadruped3d-network";
 constexpr int kFailure = 1;
 
-// The folder of the running program, also when it was started through a link.
+// Returns the folder of the running program, also if it was started through a link.
 fs::path program_folder() {
   return fs::read_symlink("/proc/self/exe").parent_path();
 }
 
-// Beside this program in a build folder; in libexec where it is installed. Empty when it is in neither place.
+// Returns the path of quadruped3d-network: beside this program in a build folder, or in libexec if installed.
+// Empty if it is in neither place.
 fs::path find_network_program() {
   const fs::path folder = program_folder();
   for (const fs::path& place : {folder / kName, folder / ".." / "libexec" / "quadruped3d" / kName}) {

@@ -1,5 +1,5 @@
-// The options that several commands share. Their names, checks and usual texts stand here once; a command
-// that means something else by one of them gives its own text.
+// The options that several commands share. Their names, checks and default texts are defined here once; a
+// command that means something else by one of them gives its own text.
 #pragma once
 
 #include <CLI/App.hpp>
@@ -18,9 +18,9 @@ struct ConfigArguments {
   std::vector<std::string> set;  // KEY=VALUE of each --set
   std::string device;            // of --device; empty if it is not given
 
-  // The single keys that the command line sets, on top of the files.
+  // Returns the single keys that the command line sets on top of the files.
   std::vector<std::string> settings() const;
-  // The words that give another command the same config.
+  // Returns the words that give another command the same config.
   std::vector<std::string> words() const;
 };
 
@@ -31,9 +31,10 @@ CLI::Option* config_option(
     const std::string& text = "JSON config file; keys of a later file replace those of an earlier one");
 // --device: the device of the config's network.
 CLI::Option* device_option(CLI::App& command, ConfigArguments& config);
-// -o,--out: a path, and how it is written: --no-sync, --no-lock. Not required unless the caller says so.
+// -o,--out is a path. Also adds --no-sync and --no-lock, which say how it is written. Not required unless the
+// caller says so.
 CLI::Option* out_option(CLI::App& command, std::filesystem::path& out, const std::string& text);
-// The same, for a command whose output is one file.
+// Adds the same options for a command whose output is one file.
 CLI::Option* out_file_option(CLI::App& command, std::filesystem::path& out, const std::string& text);
 // -t,--threads: a number, 0 or more.
 CLI::Option* threads_option(
@@ -47,7 +48,7 @@ CLI::Option* above_ceiling_flag(CLI::App& command, bool& above_ceiling);
 // -q,--quiet
 CLI::Option* quiet_flag(CLI::App& command, bool& quiet);
 
-// --resamples and --seed of the bootstrap by which two sets of results are compared, -o,--out and --json.
+// Adds --resamples and --seed of the bootstrap that compares two sets of results, and -o,--out and --json.
 void comparison_options(CLI::App& command, filters::BootstrapOptions& bootstrap, std::filesystem::path& out,
                         bool& json);
 

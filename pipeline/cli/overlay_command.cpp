@@ -79,7 +79,7 @@ void output_options(CLI::App& command, Arguments& arguments) {
   json_flag(command, arguments.json, "print the ids that were drawn as JSON");
 }
 
-// The command line's words -> the library's options.
+// Converts the words of the command line to the library's options.
 report::OverlayOptions options_of(Arguments arguments) {
   report::OverlayOptions options = std::move(arguments.options);
   const auto order = [&](report::Order kind, std::size_t count) {

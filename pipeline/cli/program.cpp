@@ -28,7 +28,7 @@ namespace {
 constexpr int kFailure = 1;
 constexpr int kUsage = 2;
 
-// Returns what a person can do about an errno.
+// Returns advice on what a person can do about an errno.
 const char* advice(int code) {
   switch (code) {
     case EACCES:
@@ -53,7 +53,7 @@ const char* advice(int code) {
   }
 }
 
-// Adds every command in the order of kCommands; returns those that this program can run.
+// Adds every command in the order of kCommands. Returns those that this program can run.
 std::vector<std::pair<std::string, Command>> add_commands(CLI::App& app,
                                                           std::span<const CommandEntry> entries) {
   std::vector<std::pair<std::string, Command>> commands;

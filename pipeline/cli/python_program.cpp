@@ -23,7 +23,7 @@ std::vector<char*> pointers(std::vector<std::string>& words) {
   return result;
 }
 
-// Everything that arrives before the other end is closed.
+// Returns everything that arrives before the other end is closed.
 std::string read_all(int descriptor) {
   std::string text;
   std::array<char, 4096> block{};

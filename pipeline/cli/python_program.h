@@ -6,7 +6,7 @@
 
 namespace q3d::pipeline::cli {
 
-// Says whether this interpreter can import the module, and what it printed if not.
+// Says whether this interpreter can import the module, and the interpreter's output if it cannot.
 struct PythonCheck {
   bool has_module = false;
   std::string message;

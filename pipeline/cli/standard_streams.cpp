@@ -18,14 +18,14 @@
 namespace q3d::pipeline::cli {
 namespace {
 
-// open(2) takes the lowest number that is free, and all lower ones are open when this one's turn comes. A
-// stdout that was closed cannot be written, so that what is printed there is missed in the end.
+// Opens the streams in ascending order, because open(2) takes the lowest free number. A stdout that was
+// closed is opened read-only, so that finish_stdout() notices printed text that is lost.
 void open_closed_streams() {
   constexpr std::array kStreams{STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO};
   for (const int stream : kStreams) {
     if (::fcntl(stream, F_GETFD) != -1 || errno != EBADF) continue;
     const int opened = ::open("/dev/null", stream == STDERR_FILENO ? O_WRONLY : O_RDONLY);
-    if (opened != stream) _exit(1);  // there is nothing left to tell it to
+    if (opened != stream) _exit(1);  // no stream is left for a message
   }
 }
 
@@ -50,8 +50,8 @@ ssize_t write_terminal(void*, const char* text, std::size_t size) {
   return write_all(STDOUT_FILENO, run::printable_text({text, size})) ? static_cast<ssize_t>(size) : 0;
 }
 
-// The C library lets a program put another stream in the place of stdout and stderr. The old ones stay open,
-// for whoever has kept them.
+// The C library lets a program replace stdout and stderr by other streams. The old ones stay open for code
+// that holds them.
 std::FILE* stream_to(cookie_write_function_t* write, int buffering) {
   std::FILE* stream = ::fopencookie(nullptr, "w", {nullptr, write, nullptr, nullptr});
   if (stream == nullptr)

@@ -1,4 +1,4 @@
-// The three standard streams, whatever state they are in and whatever is written to them.
+// Makes the three standard streams safe, whatever their state is and whatever is written to them.
 #pragma once
 
 #include <string>
@@ -15,13 +15,13 @@ namespace q3d::pipeline::cli {
 // - A stderr that cannot be written (a full disk) is not an error: its text is lost.
 void prepare_standard_streams();
 
-// Writes what is still to be written to stdout. Throws std::runtime_error if anything that was printed has
-// not arrived, because then the command has not done what it was asked for.
+// Flushes stdout. Throws std::runtime_error if any printed text has not arrived, because the command has then
+// failed.
 void finish_stdout();
 
-// Whether something that was printed to stdout has not arrived.
+// Returns whether any text that was printed to stdout has not arrived.
 bool stdout_failed();
-// The message for a stdout that cannot be written; `reason` is the system's.
+// Returns the message for a stdout that cannot be written. `reason` is the system's text.
 std::string unwritten_stdout(const std::string& reason);
 
 }  // namespace q3d::pipeline::cli

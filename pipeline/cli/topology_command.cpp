@@ -59,7 +59,7 @@ int show_builtin(const std::string& name) {
                                      manifests::suggestion(name, names), fmt::join(names, ", ")));
 }
 
-// Tells what was guessed, with all doubts at once.
+// Prints the guessed topology and all doubts.
 void print_draft(const topology::Draft& draft, const fs::path& out) {
   const auto count = static_cast<std::int64_t>(draft.guess.topology.keypoints.size());
   fmt::print(stderr, "{} ({}): {}\n", draft.survey.file.string(), draft.survey.kind,

@@ -75,7 +75,7 @@ Command add_train(CLI::App& app) {
         training::train(training::settings::load_training_config(arguments->config.files, arguments->stage,
                                                                  arguments->config.settings()),
                         arguments->options);
-    if (summary.rank != 0) return 0;  // rank 0 speaks for all
+    if (summary.rank != 0) return 0;  // rank 0 reports for all
     print_summary(summary);
     if (arguments->json) fmt::print("{}\n", to_json(summary).dump());
     return 0;

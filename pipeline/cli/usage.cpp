@@ -15,7 +15,7 @@ bool is_option(std::string_view word) {
   return word.size() > 1 && word.front() == '-';
 }
 
-// The innermost command that was recognised, with its name as it is typed: "quadruped3d config show".
+// The innermost command that was recognised, with its full name: "quadruped3d config show".
 struct Recognised {
   const CLI::App* app;
   std::string name;
@@ -46,12 +46,12 @@ std::vector<std::string> subcommand_names(const CLI::App& app) {
   return names;
 }
 
-// The option without a value that is attached to it: "--confg=my.json" -> "--confg".
+// Returns the option without an attached value: "--confg=my.json" -> "--confg".
 std::string option_name(const std::string& word) {
   return word.substr(0, word.find('='));
 }
 
-// Names what was not understood, or is empty if all words were.
+// Returns a text that names the words that were not understood; empty if there are none.
 std::string unknown_words(const CLI::App& app) {
   const std::vector<std::string> words = app.remaining();
   const std::vector<std::string> commands = subcommand_names(app);

@@ -1,4 +1,4 @@
-// The messages about a command line that cannot be used.
+// Makes the messages about a command line that cannot be used.
 #pragma once
 
 #include <CLI/App.hpp>
@@ -19,7 +19,7 @@ std::vector<std::string> with_help_expanded(std::vector<std::string> words);
 std::optional<std::string> unknown_command(const std::vector<std::string>& words);
 
 // Explains why `app` could not parse its command line. It names unknown options and words, each with the
-// nearest known one, and lists what there is.
+// nearest known one, and lists all that exist.
 std::string usage_message(const CLI::App& app, const CLI::ParseError& error);
 
 }  // namespace q3d::pipeline::cli

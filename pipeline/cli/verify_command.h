@@ -1,4 +1,4 @@
-// `verify`, in both programs: only the one that can build repairs.
+// `verify` exists in both programs; only the one that can build also repairs.
 #pragma once
 
 #include <functional>
@@ -11,12 +11,12 @@ namespace q3d::pipeline::cli {
 
 struct RepairArguments {
   std::filesystem::path dataset;
-  ConfigArguments config;  // no files: copies alone are used
+  ConfigArguments config;  // without files, only copies are used
   run::RunOptions run;
   bool json = false;
 };
 
-// Repairs, tells what it did and returns the exit code.
+// Repairs the dataset, reports what was done and returns the exit code.
 using RepairCommand = std::function<int(const RepairArguments&)>;
 
 // Without `repair`, the command runs only without --repair.

@@ -6,7 +6,8 @@
 namespace q3d::pipeline::cli {
 namespace {
 
-// Within single quotes of zsh, with a backslash before the signs that _arguments and _describe take apart.
+// Escapes a text for zsh's single quotes, with a backslash before the characters that _arguments and
+// _describe interpret.
 std::string escaped(const std::string& text) {
   std::string result;
   for (const char sign : text) {
@@ -41,7 +42,7 @@ std::string action_of(const OptionInfo& option) {
   return " ";
 }
 
-// The specification of an option for _arguments, once for each of its names.
+// Returns the specification of an option for _arguments, once for each of its names.
 std::string option_specs(const OptionInfo& option) {
   std::string text;
   for (const std::string& name : option.names) {
@@ -67,7 +68,7 @@ std::string specs(const CommandNode& node) {
   return text;
 }
 
-// A function for a command without commands of its own.
+// Returns a function for a command without commands of its own.
 std::string leaf(const CommandNode& node) {
   return fmt::format("{}() {{\n  local -a specs=(\n{}  )\n  _arguments -s $specs\n}}\n", function_of(node),
                      specs(node));

@@ -24,7 +24,7 @@ void require(bool holds, const std::string& where, const std::string& what) {
   if (!holds) throw run::ConfigError(where + ": " + what);
 }
 
-// File systems take names of 255 bytes, and keys and endings are added to these.
+// File systems allow names of 255 bytes, and keys and endings are appended to these names.
 constexpr std::size_t kMaxNameBytes = 200;
 
 // Returns whether the text may become a file's name.
@@ -42,7 +42,7 @@ bool is_version(std::string_view text) {
          text.find("..") == std::string_view::npos;
 }
 
-// Reads the keys that only labels of one's own have: their keypoints are not known beforehand.
+// Returns whether a format takes a setting of own labels, whose keypoints are not known beforehand.
 // Photographs have no keypoints, but they have a species, and their boxes have scores.
 bool takes_setting(const std::string& format, const std::string& key) {
   if (format == "photographs") return key == "species" || key == "min_confidence";
@@ -121,7 +121,7 @@ LeakageConfig parse_leakage(const json& object, const std::string& where) {
   return leakage;
 }
 
-// Reads an object that has settings alone.
+// Reads an object that has only settings.
 template <typename Struct>
 void parse_object(const json& object, const std::string& where, const Settings<Struct>& settings,
                   Struct& config) {
@@ -143,7 +143,7 @@ void require_both_taus(const std::optional<double>& tau_low, const std::optional
       "\"tau_low\" and \"tau_high\" belong together: give both, or neither and run `quadruped3d calibrate`");
 }
 
-// `names`: of the config's datasets.
+// `names` are those of the config's datasets.
 void parse_dataset_thresholds(const json& object, const std::string& where,
                               const std::vector<std::string>& names, FilterConfig& filter) {
   require(object.is_object(), where, "expected a JSON object with a dataset's name for each key");
@@ -191,7 +191,7 @@ void resolve_paths(json& config, const fs::path& folder) {
   if (config.contains("leakage")) resolve_dataset_paths(config["leakage"], "test_sets", folder);
 }
 
-// The config laid over its profile.
+// Returns the config laid over its profile.
 json expand_profile(const json& merged, const std::string& where) {
   std::string profile = BuildConfig().profile;
   JsonFields(merged, where).read("profile", profile);
@@ -211,7 +211,7 @@ std::vector<std::string> names_of(const std::vector<DatasetConfig>& datasets) {
 
 namespace {
 
-// The objects below the top level, all but the datasets.
+// Reads the objects below the top level except the datasets.
 void parse_parts(JsonFields& fields, const std::string& where, BuildConfig& config) {
   const auto part = [&](const char* key, auto parse) {
     if (const json* object = fields.child(key)) parse(*object, where + ": " + key);
@@ -262,7 +262,7 @@ BuildConfig parse_build_config(const json& merged, const std::string& where, Net
   const json* network = fields.child("network");
   if (datasets != nullptr) config.datasets = parse_datasets(*datasets, where + ": datasets");
   parse_parts(fields, where, config);
-  fields.finish();  // first, so that a misspelt key is named rather than the one that seems to be missing
+  fields.finish();  // first, so that a misspelt key is named rather than the key that then seems missing
   require(!config.datasets.empty(), where, "\"datasets\" must name at least one dataset");
   if (network != nullptr) {
     parse_object(*network, where + ": network", network_settings(), config.network);

@@ -20,21 +20,21 @@
 
 namespace q3d::pipeline::config {
 
-// How a dataset is read, and what the build makes of it.
+// How a dataset is read, and how the build uses it.
 struct DatasetConfig : loaders::formats::DatasetOptions {
   Role role = Role::pseudo;
   std::filesystem::path curation{};  // list of `curate` that names the pictures to take; empty takes all
   std::filesystem::path
       body_model{};  // checks the file's 3D keypoints (pipeline/candidates/body_check.h); empty does not
-  bool keypoints_3d_of_body = false;  // labels get the body's instead of the file's
-  // For those who get the dataset: under which terms pictures and annotations came, from where, and whom to
-  // cite. Shards and dataset.json repeat them.
+  bool keypoints_3d_of_body = false;  // labels get the body's 3D keypoints instead of the file's
+  // Terms, origin and citation of pictures and annotations, for those who receive the dataset. Shards and
+  // dataset.json repeat them.
   std::string licence{};
   std::string source_url{};
   std::string citation{};
   bool turns_by_exif = false;             // the labels were made on the pictures as EXIF turns them
   double max_picture_megapixels = 200.0;  // a larger picture fails before it is decoded
-  bool scales_resized = false;            // labels of pictures that were resized since are scaled with them
+  bool scales_resized = false;            // labels are scaled if their pictures have been resized
 };
 
 struct NetworkConfig {
@@ -54,16 +54,16 @@ struct TtaConfig {
   double learning_rate = 1e-6;
   double aux_weight = 5.0;
   double reproj_weight = 0.5;
-  double pose_prior_weight = 0.0;  // of either objective; above 0 the priors are needed
+  double pose_prior_weight = 0.0;  // for both objectives; above 0 the priors are needed
   double shape_prior_weight = 0.0;
   int iterations_min = 10;
   int iterations_max = 60;
   double stop_below = 0.0;       // crop units; 0 = never
-  bool refine_retained = false;  // adapt what lies below tau_low too
+  bool refine_retained = false;  // also adapt samples below tau_low
   int batch = 8;
 };
 
-// Thresholds of one dataset; what is absent is as for the others.
+// Thresholds of one dataset. An absent one is the common threshold.
 struct DatasetThresholds {
   std::optional<double> tau_low;  // crop units; both or none
   std::optional<double> tau_high;
@@ -75,20 +75,20 @@ struct FilterConfig {
   std::optional<double> tau_high;
   double delta = 0.05;
   double tau_ceiling = 0.1;                           // crop units; a tau_high above it is refused
-  double min_trust = 0.0;                             // of a kept label's combined trust; 0 = off
+  double min_trust = 0.0;                             // least combined trust of a kept label; 0 = off
   std::map<std::string, DatasetThresholds> datasets;  // by the dataset's name
 };
 
-// The guards, all off: bounds on labels, and what changes adaptation.
+// The guards, which are all off by default: bounds on labels, and changes to adaptation.
 struct GuardConfig : filters::GuardBounds {
   int iterations_full_at = 0;   // visible keypoints from which a sample gets all its iterations; 0 = off
-  double held_out_share = 0.0;  // of the visible keypoints; 0 = off
+  double held_out_share = 0.0;  // fraction of the visible keypoints; 0 = off
   std::uint64_t held_out_seed = 0;
   int held_out_patience = 0;     // iterations without a new least held-out error; 0 = no limit
   std::filesystem::path priors;  // pose and shape priors; empty = the checkpoint's
 };
 
-// What `calibrate` aims at.
+// The aims of `calibrate`.
 struct CalibrateConfig : filters::TargetShares {
   bool per_dataset = false;  // thresholds for each dataset instead of common ones
 };
@@ -101,7 +101,7 @@ struct ShardConfig {
   int crop_min_side_px = 480;
 };
 
-// Pictures of the pool that are in these sets too are left out of the pseudo labels.
+// Pictures of the pool that are also in these sets get no pseudo label.
 struct LeakageConfig {
   std::vector<DatasetConfig> test_sets;
   int max_distance = 4;  // bits of 64 in which the hashes of one picture's copies may differ
@@ -109,37 +109,37 @@ struct LeakageConfig {
 
 struct BuildConfig {
   std::string name = "quadruped3d";
-  std::string version = "1.0.0";  // semantic version of the dataset, the user's own
+  std::string version = "1.0.0";  // the user's semantic version of the dataset
   std::string profile = "paper";  // the set of guards that the config starts from; pipeline/config/profiles.h
   std::vector<DatasetConfig> datasets;
-  NetworkConfig network;  // without paths when the config names none
+  NetworkConfig network;  // has no paths if the config names none
   TtaConfig tta;
   FilterConfig filter;
   GuardConfig guards;
   ShardConfig shards;
   CalibrateConfig calibrate;
   std::optional<LeakageConfig> leakage;
-  double max_failed_share = 0.9;  // of the candidates; a build in which more failed exits 1
+  double max_failed_share = 0.9;  // of the candidates; if more failed, a build exits with 1
   std::filesystem::path veto;     // ids to leave out (pipeline/candidates/veto.h); empty when there are none
   std::filesystem::path
       corrections;            // keypoints (pipeline/candidates/corrections.h); empty when there are none
   nlohmann::json as_written;  // the merged JSON, paths as the user wrote them
 };
 
-// Whether a config with pseudo labels must have the key "network". `leakage` reads no network.
+// Says whether a config with pseudo labels must have the key "network". `leakage` reads no network.
 enum class NetworkKey : std::uint8_t { required, optional };
 
 // Reads the files in order; a later file's keys replace an earlier one's. Relative paths are relative to the
 // file that names them. `settings` are single keys on top of the files (config_override.h). Throws
-// ConfigError naming file, key, got and expected.
+// ConfigError that names file and key, what was found and what was expected.
 BuildConfig load_build_config(const std::vector<std::filesystem::path>& files,
                               const std::vector<std::string>& settings = {},
                               NetworkKey network_key = NetworkKey::required);
 
-// A list of datasets, as "datasets" holds them; paths are absolute already. Throws ConfigError.
+// Reads a list of datasets in the form of the key "datasets". Paths must be absolute. Throws ConfigError.
 std::vector<DatasetConfig> parse_datasets(const nlohmann::json& list, const std::string& where);
 
-// Makes the paths of the datasets in object[key] absolute, where it is a list of them.
+// Makes the paths of the datasets in object[key] absolute, if it is a list of datasets.
 void resolve_dataset_paths(nlohmann::json& object, const char* key, const std::filesystem::path& folder);
 
 // Checks and converts merged JSON; `where` names it in messages.
@@ -149,15 +149,16 @@ BuildConfig parse_build_config(const nlohmann::json& json, const std::string& wh
 // Throws ConfigError that names the first dataset without keypoints, whose predictions nothing can judge.
 void require_keypoints(const BuildConfig& config);
 
-// Whether a dataset has the role `pseudo`. A build that needs no network takes no notice of `network`, `tta`,
+// Returns whether a dataset has the role `pseudo`. A build that needs no network ignores `network`, `tta`,
 // `filter` and `guards`.
 bool needs_network(const BuildConfig& config);
 
-// Whether adaptation's objective has a term of the pose or shape priors.
+// Returns whether adaptation's objective has a term of the pose or shape priors.
 bool uses_priors(const TtaConfig& tta);
-// Whether a guard that is on needs the pose and shape priors.
+// Returns whether a guard that is on needs the pose and shape priors.
 bool uses_priors(const GuardConfig& guards);
-// The file that holds them: the guards' own, else the checkpoint, whose official form holds them too.
+// Returns the file that holds the priors: the one in `guards`, else the checkpoint, whose official form also
+// holds them.
 std::filesystem::path priors_file(const BuildConfig& config);
 
 }  // namespace q3d::pipeline::config

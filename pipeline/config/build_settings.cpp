@@ -12,7 +12,7 @@ constexpr Range kPositive{.least = 0, .is_open_below = true};
 constexpr Range kAtLeastOne{.least = 1};
 constexpr Range kNotNegative{.least = 0};
 
-// The word of a member that is an enum.
+// Returns the word of a member that is an enum.
 template <typename Struct, typename Enum>
 Word<Struct> word_of(Enum Struct::*member, Enum (*from_string)(std::string_view)) {
   return {

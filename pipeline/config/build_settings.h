@@ -1,4 +1,4 @@
-// The tables of a build's config, one a struct (setting.h).
+// The tables of a build's config, one for each struct (setting.h).
 #pragma once
 
 #include "pipeline/config/build_config.h"
@@ -7,7 +7,7 @@
 namespace q3d::pipeline::config {
 
 const Settings<BuildConfig>& build_settings();      // the top level's own keys
-const Settings<DatasetConfig>& dataset_settings();  // without those of own labels
+const Settings<DatasetConfig>& dataset_settings();  // without own_label_settings
 // The keys that belong to the formats whose keypoints a topology describes.
 const Settings<DatasetConfig>& own_label_settings();
 const Settings<NetworkConfig>& network_settings();

@@ -1,4 +1,5 @@
-// Every configuration of this program shares this: JSON files laid over each other, and words from a list.
+// Reads the parts that all configurations of this program share: JSON files laid over each other, and words
+// from a list.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -24,7 +25,7 @@ ConfigLayers read_config_layers(
     const std::function<void(nlohmann::json& layer, const std::filesystem::path& folder)>& resolve_paths,
     const std::vector<std::string>& settings = {});
 
-// Makes object[key] absolute where it is a text.
+// Makes the path object[key] absolute if it is a text.
 void resolve_path(nlohmann::json& object, const char* key, const std::filesystem::path& folder);
 
 // Throws ConfigError that lists the known words and names the nearest.

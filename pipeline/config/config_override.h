@@ -1,4 +1,4 @@
-// Single keys of a config that the command line sets: `--set tta.learning_rate=2e-6`.
+// Sets single keys of a config from the command line: `--set tta.learning_rate=2e-6`.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -16,12 +16,12 @@ struct ConfigOverride {
   nlohmann::json value;
 };
 
-// Reads KEY=VALUE. Dots part the keys of nested objects; a key that begins with '/' is parted by '/' instead,
-// for names that hold dots. The value is JSON if it can be read as JSON, else it is a text. Throws
-// ConfigError if there is no key.
+// Reads KEY=VALUE. Dots separate the keys of nested objects. A key that begins with '/' is separated by '/'
+// instead, for names that contain dots. The value is JSON if it can be read as JSON, else it is a text.
+// Throws ConfigError if there is no key.
 ConfigOverride parse_override(const std::string& text);
 
-// Puts the value into `resolved` and `as_written` as one more config file on top of the others would: an
+// Puts the value into `resolved` and `as_written`, as another config file on top of the others would. An
 // object is merged into the object that is there, null takes the key away, anything else replaces what is
 // there. Objects that are missing on the way are made. A member of a list is named by its place from 0, or by
 // its "name" (`datasets.walk.species=goat`).

@@ -11,7 +11,7 @@ using nlohmann::ordered_json;
 ordered_json datasets_schema() {
   std::vector<SettingFacts> settings = facts_of(dataset_settings());
   for (SettingFacts facts : facts_of(own_label_settings())) {
-    facts.is_required = false;  // by the format, which the program checks
+    facts.is_required = false;  // depends on the format; the program checks it
     settings.push_back(std::move(facts));
   }
   return {{"type", "array"}, {"items", whole_object_schema(settings)}};

@@ -5,8 +5,8 @@
 
 namespace q3d::pipeline::config {
 
-// JSON Schema, draft 2020-12: every key with its type, range, words, default and description. It accepts a
-// layer, so that no key is required at the top level, and refuses unknown keys everywhere.
+// Returns a JSON Schema, draft 2020-12, with every key's type, range, words, default and description. It
+// accepts a layer, so no key is required at the top level. It refuses unknown keys everywhere.
 nlohmann::ordered_json build_config_schema();
 
 }  // namespace q3d::pipeline::config

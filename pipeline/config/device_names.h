@@ -6,7 +6,7 @@
 
 namespace q3d::pipeline::config {
 
-// Reads one device or several, parted by commas: auto, cpu, cuda, cuda:I. Only GPUs with a number can be
+// Reads one device or several, separated by commas: auto, cpu, cuda, cuda:I. Only GPUs with a number can be
 // several, and each may be named once. Throws ConfigError that names `where`.
 std::vector<std::string> parse_devices(const std::string& text, const std::string& where);
 

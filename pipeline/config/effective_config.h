@@ -1,4 +1,4 @@
-// A config with nothing left unsaid: profile expanded, defaults filled in.
+// The effective config, in which the profile is expanded and defaults are filled in.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -7,11 +7,11 @@
 
 namespace q3d::pipeline::config {
 
-// Every key of docs/config.md with its value; read as a config again, it gives the same one. Keys without a
-// default that the config does not give (thresholds, network) are left out. Paths are absolute.
+// Returns every key of docs/config.md with its value. Reading the result gives the same config. Keys without
+// a default that the config does not give (thresholds, network) are left out. Paths are absolute.
 nlohmann::ordered_json effective_config(const BuildConfig& config);
 
-// The guards alone, every key.
+// Returns every key of the guards alone.
 nlohmann::ordered_json effective_guards(const GuardConfig& guards);
 
 }  // namespace q3d::pipeline::config

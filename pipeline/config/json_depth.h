@@ -12,7 +12,7 @@
 namespace q3d::pipeline::config {
 
 // Returns a callback for json::parse that throws ConfigError beyond 32 levels. Merging and printing recurse,
-// so what a user gives must not be able to choose how deep. `where` names the source in the message.
+// so a user's file must not be able to choose the depth. `where` names the source in the message.
 inline nlohmann::json::parser_callback_t refuse_depth(const std::string& where) {
   static constexpr int kMaxDepth = 32;
   return [where](int depth, nlohmann::json::parse_event_t, nlohmann::json&) {

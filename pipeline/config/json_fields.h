@@ -1,4 +1,4 @@
-// Strict reading of one JSON object into a struct: every key must be known, every type must fit.
+// Reads one JSON object strictly into a struct: every key must be known and every type must fit.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -38,7 +38,7 @@ class JsonFields {
     if (found == nullptr) fail_missing(key);
     assign(key, *found, value);
   }
-  // The object or array under `key`, or null when it is absent.
+  // Returns the object or array under `key`, or null if it is absent.
   const nlohmann::json* child(const std::string& key) { return find(key); }
   void finish() const;
   // Throws ConfigError that names the key, and the unknown key that is probably meant to be it.

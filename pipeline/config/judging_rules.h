@@ -1,4 +1,4 @@
-// A build judges by these rules: the thresholds of each dataset and the guards.
+// The rules by which a build judges: the thresholds of each dataset and the guards.
 #pragma once
 
 #include <map>
@@ -12,15 +12,15 @@ namespace q3d::pipeline::config {
 struct JudgingRules {
   std::map<std::string, filters::Thresholds> thresholds;  // by dataset, of those of role `pseudo`
   GuardConfig guards;
-  double min_trust = 0.0;  // of a kept label's combined trust; 0 = off
+  double min_trust = 0.0;  // least combined trust of a kept label; 0 = off
 
   // Throws std::out_of_range for a dataset without pseudo labels.
   const filters::Thresholds& of(const std::string& dataset) const { return thresholds.at(dataset); }
 };
 
-// The rules of a calibrated config; without thresholds when no dataset has the role `pseudo`. A dataset's own
-// thresholds come before the common ones. Throws ConfigError naming the dataset that has none, and
-// `calibrate`.
+// Returns the rules of a calibrated config. They have no thresholds if no dataset has the role `pseudo`. A
+// dataset's own thresholds replace the common ones. Throws ConfigError that names a dataset without
+// thresholds, and `calibrate`.
 JudgingRules judging_rules(const BuildConfig& config);
 
 }  // namespace q3d::pipeline::config

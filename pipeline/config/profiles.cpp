@@ -7,10 +7,10 @@ namespace {
 
 using nlohmann::json;
 
-// `strict` has what made labels more accurate on worlds that played no part in its choice (docs/results.md):
-// every kept prediction is adapted, the pose prior takes part in adaptation, and the fifth of the labels that
-// is trusted least in the world of the fit is discarded. The guards that bound labels chose no better than a
-// lower tau_high does, so they are not part of it.
+// `strict` has the settings that made labels more accurate on worlds that were not used to choose it
+// (docs/results.md): every kept prediction is adapted, the pose prior takes part in adaptation, and min_trust
+// discards the least trusted fifth of the labels in the world of the fit. The guards that bound labels
+// selected no better than a lower tau_high, so they are not part of it.
 const std::map<std::string, json>& profiles() {
   static const std::map<std::string, json> kProfiles{
       {"paper", json::object()},

@@ -1,5 +1,5 @@
-// One table a config struct. A setting's key, member, range and description are written once; parsing,
-// showing, stage keys, the JSON Schema and the tables of docs/config.md all come from it.
+// There is one table of settings for each config struct. A setting's key, member, range and description are
+// written once; parsing, printing, stage keys, the JSON Schema and the tables of docs/config.md all use them.
 #pragma once
 
 #include <fmt/format.h>
@@ -19,8 +19,8 @@
 
 namespace q3d::pipeline::config {
 
-// The results that a setting decides: those of a stage, or the weights of a training run. `elsewhere`: none,
-// or in a way that the code which makes the key spells out.
+// The results that a setting affects: those of a stage, or the weights of a training run. `elsewhere` means
+// that it affects none, or that the code that makes the stage's key handles it.
 enum class DecidedStage : std::uint8_t { elsewhere, predict, refine, shards, weights };
 
 // A member that is written as a word, such as an enum. `set` is called with a word of the setting's list.
@@ -30,7 +30,7 @@ struct Word {
   std::function<void(Struct&, const std::string&)> set;
 };
 
-// The range of a number; an open end does not belong to it.
+// The range of a number. An open end is not part of the range.
 struct Range {
   std::optional<double> least{};
   std::optional<double> most{};
@@ -51,7 +51,7 @@ struct Setting {
   Member member;
   const char* description = nullptr;  // Markdown; a sentence or more, without the range and the default
   Range range{};
-  std::vector<std::string> words{};  // allowed texts, of a list too; empty allows any
+  std::vector<std::string> words{};  // allowed texts, also inside a list; empty allows any
   bool is_required = false;
   DecidedStage decides = DecidedStage::elsewhere;
 };
@@ -61,22 +61,22 @@ using Settings = std::vector<Setting<Struct>>;
 // The facts about a setting that the schema and the page show; they do not depend on the setting's struct.
 struct SettingFacts {
   std::string key;
-  std::string type;              // of JSON Schema: boolean, integer, number, string, array (of strings)
-  nlohmann::ordered_json value;  // null where the default is absent or empty
+  std::string type;              // type in JSON Schema: boolean, integer, number, string, array (of strings)
+  nlohmann::ordered_json value;  // null if the default is absent or empty
   std::string description;
   Range range;
   std::vector<std::string> words;
   bool is_required = false;
 };
 
-// Throws ConfigError naming key, got and expected.
+// Throws ConfigError that names the key, what was found and what was expected.
 void check_range(const Range& range, double value, const std::string& key, const std::string& where);
 
 // Throws ConfigError unless the text, or each text of the list, is one of the words.
 void check_words(const std::vector<std::string>& words, const nlohmann::ordered_json& value,
                  const std::string& where);
 
-// The value as the config file writes it; null for an absent number, an empty path and an empty list.
+// Returns the value as a config file writes it; null for an absent number, an empty path and an empty list.
 template <typename Struct>
 nlohmann::ordered_json value_of(const Setting<Struct>& setting, const Struct& config) {
   return std::visit(
@@ -131,7 +131,7 @@ void read_settings(JsonFields& fields, const Settings<Struct>& settings, Struct&
   for (const Setting<Struct>& setting : settings) read_setting(fields, setting, config);
 }
 
-// The effective values in the order of the table, absent ones left out.
+// Returns the effective values in the order of the table, without absent ones.
 template <typename Struct>
 nlohmann::ordered_json show_settings(const Settings<Struct>& settings, const Struct& config) {
   nlohmann::ordered_json object = nlohmann::ordered_json::object();
@@ -142,7 +142,7 @@ nlohmann::ordered_json show_settings(const Settings<Struct>& settings, const Str
   return object;
 }
 
-// The effective values that decide a stage's results: its part of the stage's key.
+// Returns the effective values that affect a stage's results. They are the config's part of the stage's key.
 template <typename Struct>
 nlohmann::json key_parts(const Settings<Struct>& settings, const Struct& config, DecidedStage stage) {
   nlohmann::json parts = nlohmann::json::object();

@@ -1,4 +1,4 @@
-// JSON Schema of the objects that tables of settings describe.
+// Makes the JSON Schema of the objects that tables of settings describe.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -10,11 +10,11 @@
 
 namespace q3d::pipeline::config {
 
-// An object with these keys and no others; none of them must be there.
+// Returns the schema of an object with these keys and no others, all of them optional.
 nlohmann::ordered_json object_schema(const std::vector<SettingFacts>& settings);
-// The same, but the keys without a default must be there.
+// Returns the same schema, in which keys without a default are required.
 nlohmann::ordered_json whole_object_schema(const std::vector<SettingFacts>& settings);
-// The object as a document of its own, draft 2020-12.
+// Returns the schema of an object as a document, draft 2020-12.
 nlohmann::ordered_json schema_document(const std::string& title, const nlohmann::ordered_json& object);
 
 }  // namespace q3d::pipeline::config

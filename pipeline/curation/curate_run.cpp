@@ -25,7 +25,7 @@ using loaders::curation::Curated;
 using loaders::curation::CuratedPicture;
 using nlohmann::ordered_json;
 
-// The labels that are known for pictures besides their names, by normalised sub-dataset.
+// The labels that the sources' own files give for pictures, by normalised sub-dataset.
 using LabelsOfSource = std::map<std::string, loaders::curation::SourceLabels>;
 
 struct Inputs {
@@ -45,8 +45,8 @@ LabelsOfSource read_sources(const CurationConfig& config, Inputs& inputs) {
   return labels;
 }
 
-// The pictures of one split, in the order of their first records. Several animals of different species leave
-// a picture without one.
+// Adds the pictures of one split in the order of their first records. A picture with animals of different
+// species has no species.
 void add_pictures(const loaders::formats::Dataset& dataset, std::vector<CuratedPicture>& pictures) {
   std::unordered_map<std::string_view, std::size_t> place_of;
   for (const manifests::SampleRecord& record : dataset.records) {
@@ -62,7 +62,7 @@ void add_pictures(const loaders::formats::Dataset& dataset, std::vector<CuratedP
   }
 }
 
-// Species and video from the source's own files where names do not tell.
+// Fills in species and video from the source's own files if names do not tell them.
 void complete(const CurationConfig& config, const LabelsOfSource& labels, CuratedPicture& picture) {
   const std::string source = loaders::species::normalised_source(picture.source);
   const auto known = labels.find(source);
@@ -111,7 +111,7 @@ void count(const std::vector<CuratedPicture>& pictures, const std::vector<Curate
   }
 }
 
-// Most of what a rule leaves out by mistake is a species without pictures, or names without a species.
+// Warns of the most common mistakes in a rule: a species without pictures, and names without a species.
 void add_warnings(const CurationConfig& config, CurationSummary& summary) {
   for (const auto& [species, names] : config.rule.species) {
     if (!summary.available.contains(species)) {

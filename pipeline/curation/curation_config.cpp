@@ -18,7 +18,7 @@ void require(bool holds, const std::string& where, const std::string& what) {
   if (!holds) throw run::ConfigError(where + ": " + what);
 }
 
-// Texts, at least one, none of them empty.
+// Reads a list of at least one text, none of them empty.
 std::vector<std::string> parse_texts(const json& list, const std::string& where) {
   require(list.is_array() && !list.empty(), where, "must be a list of texts, got " + list.dump());
   std::vector<std::string> texts;
@@ -81,7 +81,7 @@ void resolve_paths(json& config, const fs::path& folder) {
   }
 }
 
-// One dataset a split, and a number for each: what is not drawn from must not be there by mistake.
+// Checks that each split has one dataset and one number, so that no dataset is ignored by mistake.
 void check_splits(const CurationConfig& config, const std::string& where) {
   std::set<std::string> splits;
   for (const config::DatasetConfig& dataset : config.datasets) {

@@ -12,15 +12,15 @@
 
 namespace q3d::pipeline::curation {
 
-// A sub-dataset's own annotation files, for what its pictures' names do not tell.
+// A sub-dataset's own annotation files. They give species and videos that its pictures' names do not tell.
 struct CurationSource {
-  std::string source;  // as the set's `source_dataset` has it; case, '-' and '_' do not matter
+  std::string source;  // as in the set's `source_dataset`; case, '-' and '_' do not matter
   std::vector<std::filesystem::path> annotations;
 };
 
 struct CurationConfig {
   std::string name = "curation";                // of the list's file
-  std::vector<config::DatasetConfig> datasets;  // one a split
+  std::vector<config::DatasetConfig> datasets;  // one for each split
   std::vector<CurationSource> sources;
   std::vector<std::string> videos;  // sub-datasets whose pictures are frames of videos, spelled as above
   loaders::curation::CurationRule rule;
@@ -29,7 +29,7 @@ struct CurationConfig {
 
 // Reads the files in order; a later file's keys replace an earlier one's. Relative paths are relative to the
 // file that names them. `settings` are single keys on top of the files (pipeline/config/config_override.h).
-// Throws ConfigError naming file, key, got and expected.
+// Throws ConfigError that names file and key, what was found and what was expected.
 CurationConfig load_curation_config(const std::vector<std::filesystem::path>& files,
                                     const std::vector<std::string>& settings = {});
 

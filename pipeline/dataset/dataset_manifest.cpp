@@ -27,7 +27,7 @@ ordered_json counts_json(const Counts& counts) {
           {"failed", counts.failed}};
 }
 
-// Those of each dataset with pseudo labels; null where there is none.
+// Describes the thresholds of each dataset with pseudo labels. Returns null if there is none.
 ordered_json describe_thresholds(const DatasetInputs& inputs) {
   if (!config::needs_network(*inputs.config)) return nullptr;
   ordered_json datasets = ordered_json::object();
@@ -38,7 +38,8 @@ ordered_json describe_thresholds(const DatasetInputs& inputs) {
   return datasets;
 }
 
-// Every guard with its value, 0 = off, without the path of the priors, which `provenance` has a digest of.
+// Describes every guard with its value, where 0 is off. The path of the priors is left out, because
+// `provenance` has their digest.
 ordered_json describe_guards(const DatasetInputs& inputs) {
   if (!config::needs_network(*inputs.config)) return nullptr;
   ordered_json guards = config::effective_guards(inputs.config->guards);

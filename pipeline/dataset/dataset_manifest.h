@@ -42,11 +42,11 @@ struct Counts {
   bool operator==(const Counts&) const = default;
 };
 
-// The candidates of one group: of one dataset, family or species, or all of them.
+// Counts the candidates of one group, which is a dataset, a family, a species or the whole dataset.
 struct GroupStatistics {
   Counts counts;
-  // Mean L_proj of the kept ones before and after refinement, in crop units (crop side = 1); absent where it
-  // was computed for none of them.
+  // Mean L_proj of the kept candidates before and after refinement, in crop units (crop side = 1). Absent if
+  // it was computed for none of them.
   std::optional<double> mean_initial_error;
   std::optional<double> mean_final_error;
 };
@@ -61,8 +61,8 @@ struct DatasetManifest {
   std::string profile;
   int schema = 0;
   Counts counts;
-  std::map<manifests::LabelKind, std::int64_t> labels;  // kept samples by kind of label
-  std::map<manifests::Reason, std::int64_t> reasons;    // of the discarded and the failed
+  std::map<manifests::LabelKind, std::int64_t> labels;  // number of kept samples by kind of label
+  std::map<manifests::Reason, std::int64_t> reasons;    // number of discarded and failed ones by reason
   GroupStatistics all;
   std::map<std::string, GroupStatistics> by_dataset;  // by "name/split"
   std::map<manifests::Family, GroupStatistics> by_family;
@@ -77,13 +77,13 @@ struct DatasetManifest {
   std::string device;
   std::vector<ShardEntry> shards;
   std::string verdicts_sha256;
-  std::vector<Warning> warnings;  // why the labels may be worth little
+  std::vector<Warning> warnings;  // reasons why the labels may be worth little
 };
 
 // Returns the terms that the config states for its datasets, by "name/split".
 std::map<std::string, manifests::DatasetTerms> terms_of_datasets(const config::BuildConfig& config);
 
-// SHA-256 over the shards' digests, one a line, in unit order.
+// Returns the SHA-256 over the shards' digests, one on each line, in unit order.
 std::string content_id(const std::vector<ShardEntry>& shards);
 
 // Counts the candidates and their verdicts for dataset.json.
@@ -97,7 +97,7 @@ class VerdictBooks {
   nlohmann::ordered_json statistics_json() const;
 
  private:
-  struct Mean {  // of the errors that were computed
+  struct Mean {  // mean of the errors that were computed
     double sum = 0.0;
     std::int64_t count = 0;
     void add(double error);
@@ -131,22 +131,21 @@ struct DatasetInputs {
   std::vector<Warning> warnings{};
 };
 
-// A list of {kind, dataset, text}; `dataset` is null where a note concerns the whole pool.
+// Returns a list of {kind, dataset, text}. `dataset` is null if a note concerns the whole pool.
 nlohmann::ordered_json notes_json(const std::vector<candidates::IngestNote>& notes);
 
-// Text of dataset.json, which ends with a digest over itself (manifests/sealed_json.h). It has no time, host
-// or absolute path of its own, so equal builds give equal bytes.
+// Returns the text of dataset.json, which ends with a digest over itself (manifests/sealed_json.h). The
+// function adds no time, host or absolute path, so equal builds give equal bytes.
 std::string dataset_json(const DatasetInputs& inputs, const VerdictBooks& books,
                          const std::vector<ShardEntry>& shards, const std::string& verdicts_sha256);
 
 // Reads dataset.json of a dataset's folder, or of the newest one (`latest`) of an output folder. Throws
 // std::runtime_error that names the file, what was found and what was expected, also for a name that is no
-// enumerator's and for a shard that lies elsewhere than in the folder `shards`; and like
-// read_dataset_document.
+// enumerator's and for a shard outside the folder `shards`. Also throws as read_dataset_document does.
 DatasetManifest read_dataset_manifest(const std::filesystem::path& given);
-// The whole document, without its digest. Throws like manifests::read_dataset_document.
+// Returns the whole document without its digest. Throws like manifests::read_dataset_document.
 nlohmann::ordered_json read_dataset_document(const std::filesystem::path& given);
-// The folder itself, or its `latest`. Throws std::runtime_error when neither holds a dataset.json.
+// Returns the folder itself, or its `latest`. Throws std::runtime_error if neither holds a dataset.json.
 std::filesystem::path dataset_folder(const std::filesystem::path& given);
 
 }  // namespace q3d::pipeline::dataset

@@ -20,7 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
-// All that is known of the candidate besides its row of verdicts.csv.
+// Everything that is known about the candidate in addition to its row of verdicts.csv.
 struct Evidence {
   manifests::SampleRecord record;  // id, image_ref, box and keypoints
   std::optional<smal::CropPoints> before;
@@ -57,7 +57,7 @@ void read_stages(const PublishedDataset& dataset, const VerdictRow& row, Evidenc
   }
 }
 
-// A damaged table is told, not thrown: the rest of the story is still true.
+// Gathers the evidence. A damaged table is reported, not thrown, because the other parts are still valid.
 Evidence gather(const PublishedDataset& dataset, const VerdictRow& row) {
   Evidence evidence;
   try {
@@ -66,7 +66,7 @@ Evidence gather(const PublishedDataset& dataset, const VerdictRow& row) {
     evidence.missing.emplace_back(error.what());
   }
   if (!evidence.record.id.empty() || !row.label) return evidence;
-  // A kept sample's label is in its shard, wherever the dataset was taken.
+  // A kept sample's label is in its shard, even if the dataset was moved.
   const manifests::ShardSample sample = dataset.sample(row);
   evidence.record = sample.record;
   if (sample.has_keypoints_3d) evidence.after = sample.projected_2d;
@@ -107,7 +107,7 @@ ordered_json describe_crop(const manifests::SampleRecord& record) {
           {"patch_from_image", loaders::pictures::patch_from_image(square, loaders::pictures::kPatchSidePx)}};
 }
 
-// The trust scores; null where there was nothing to measure.
+// Describes the trust scores. Returns null if nothing was measured.
 ordered_json describe_trust(const manifests::TrustScores& trust) {
   ordered_json scores = ordered_json::object();
   for (const manifests::TrustColumn& column : manifests::kTrustColumns) {
@@ -141,7 +141,7 @@ ordered_json describe_source(const VerdictRow& row, const Evidence& evidence) {
           {"image_sha256", row.image_sha256}};
 }
 
-// Those of the candidate's dataset; nothing where its labels are no predictions.
+// Returns the thresholds of the candidate's dataset, or nothing if its labels are not predictions.
 std::optional<filters::Thresholds> thresholds_of(const DatasetManifest& manifest, const std::string& name) {
   const auto found = manifest.thresholds.find(name);
   return found == manifest.thresholds.end() ? std::nullopt : std::optional(found->second);

@@ -50,7 +50,7 @@ std::string error_text(const ordered_json& error, double side_px) {
                      fmt::format("({:.1f} px)", error.get<double>() * side_px));
 }
 
-// The worst first; unlabelled ones are only counted.
+// Lists the keypoints, the worst first. Unlabelled ones are only counted.
 std::string tell_keypoints(const ordered_json& story) {
   const double side_px = story.at("crop").at("side_px").get<double>();
   std::vector<const ordered_json*> visible;
@@ -77,7 +77,7 @@ std::string tell_keypoints(const ordered_json& story) {
   return told;
 }
 
-// Height from the least to the greatest of the curve.
+// Draws the curve in one line. The heights range from its least to its greatest value.
 std::string sparkline(const std::vector<double>& curve) {
   constexpr std::array<std::string_view, 8> kBars{"▁", "▂", "▃", "▄", "▅", "▆", "▇", "█"};
   const auto [least, greatest] = std::minmax_element(curve.begin(), curve.end());

@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 
 constexpr const char* kFormat = "quadruped3d-listed-export";
-// What decides an export's bytes. Its manifest has these members, whichever program wrote it.
+// These members of an export's manifest decide its bytes. Every program that writes exports has them.
 constexpr std::array<const char*, 5> kKeyParts{"export", "code", "key", "content_id", "pictures_anyway"};
 // An unfinished export describes itself in one of these files: the first is this program's, the second the
 // Python package's.
@@ -42,7 +42,7 @@ std::optional<ListedExport> read_entry(const fs::path& file) {
                           entry.at("folder").get<std::string>()};
     }
   } catch (const json::exception&) {
-    // Told below, as any other content.
+    // The code below reports it like any other unusable content.
   }
   run::log_warning(
       fmt::format("{}: damaged: it is no entry of the list of exports; the next run of its "
@@ -51,7 +51,7 @@ std::optional<ListedExport> read_entry(const fs::path& file) {
   return std::nullopt;
 }
 
-// The object in a file, or in its first line; null if there is none.
+// Returns the object in a file, or in its first line; null if there is none.
 json first_object(const fs::path& file) {
   if (!fs::is_regular_file(file)) return nullptr;
   const std::string text = manifests::read_file(file);
@@ -72,7 +72,7 @@ std::string key_of(const json& about) {
   return manifests::sha256(parts.dump());
 }
 
-// Whether an entry of an export's manifest is a file below the folder, of the listed size.
+// Returns whether an entry of an export's manifest names a file below the folder with the listed size.
 bool is_there(const json& entry, const fs::path& folder, std::string& name) {
   if (!entry.is_object() || !entry.value("file", json()).is_string()) return false;
   name = entry.at("file").get<std::string>();

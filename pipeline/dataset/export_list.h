@@ -28,10 +28,10 @@ void list_export(const PublishedDataset& dataset, const std::string& format, boo
                  const std::filesystem::path& folder);
 
 enum class ExportState : std::uint8_t {
-  complete,    // its manifest is there, and every file that it lists has the listed size
-  damaged,     // its manifest is there, and files are gone or of another size
-  unfinished,  // the same `export` command goes on with it
-  gone         // the folder is not there, or holds something else now
+  complete,    // its manifest exists, and every file that it lists has the listed size
+  damaged,     // its manifest exists, but files are gone or have another size
+  unfinished,  // the same `export` command continues it
+  gone         // the folder does not exist, or holds something else now
 };
 
 struct ExportStatus {
@@ -41,8 +41,8 @@ struct ExportStatus {
   std::vector<std::string> damaged;  // files
 };
 
-// The list, in the order of format and folder. Reads the manifests of the exports, and changes nothing. A
-// file that holds no entry is left out, and a warning names it. Throws manifests::IoError.
+// Returns the list in the order of format and folder. Reads the manifests of the exports, and changes
+// nothing. A file that holds no entry is left out, and a warning names it. Throws manifests::IoError.
 std::vector<ExportStatus> listed_exports(const std::filesystem::path& out);
 
 }  // namespace q3d::pipeline::dataset

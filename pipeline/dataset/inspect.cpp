@@ -19,7 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
-// The row of a shard that holds this id, else the only one whose id contains it.
+// Returns the row of a shard with this id, else the only row whose id contains it.
 std::optional<std::int64_t> row_of(const manifests::ShardReader& shard, const std::string& id) {
   const std::vector<std::string> ids = shard.table().text("id", 0, shard.rows());
   const auto found = std::find(ids.begin(), ids.end(), id);
@@ -133,7 +133,7 @@ std::vector<manifests::ShardSample> spread_samples(const fs::path& path, int cou
   std::vector<manifests::ShardSample> chosen;
   std::int64_t first = 0;  // row of the shard's first sample, counted through all shards
   for (const auto& [file, rows] : shards) {
-    std::optional<manifests::ShardReader> shard;  // opened when a row of it is wanted
+    std::optional<manifests::ShardReader> shard;  // opened when one of its rows is needed
     for (auto next = static_cast<std::int64_t>(chosen.size()); next < wanted; ++next) {
       const std::int64_t row = next * total / wanted - first;
       if (row >= rows) break;

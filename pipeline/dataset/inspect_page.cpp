@@ -35,7 +35,7 @@ std::string error_text(double error) {
   return std::isnan(error) ? "not computed" : fmt::format("{:.4f}", error);
 }
 
-// A count, its share, its name and its sentence.
+// Returns a line with a count, its share, its name and its sentence.
 std::string counted(std::int64_t count, std::int64_t of, std::string_view name, std::string_view told) {
   return fmt::format("  {:>8} {:>8}  {:<22}  {}\n", count, share(count, of), name, told);
 }
@@ -86,7 +86,7 @@ std::string group_line(std::string_view name, const Counts& counts) {
                      share(kept, counts.candidates));
 }
 
-// Datasets and families in full, of the species the most frequent.
+// Lists all datasets and families, and the most frequent species.
 std::string groups_part(const DatasetManifest& manifest) {
   const auto head = [](std::string_view title) {
     return fmt::format("\n{:<26} {:>10} {:>8} {:>8}\n", title, "candidates", "kept", "share");
@@ -141,7 +141,7 @@ std::string places_part(const PublishedDataset& dataset) {
   return text;
 }
 
-// The order of the 26 in every array of keypoints, with the number of each row's first.
+// Lists the 26 keypoints in the order of every array, with the index of the first one in each row.
 std::string keypoints_part() {
   constexpr std::size_t kPerLine = 6;
   const std::vector<std::string>& names = loaders::keypoints::topology("animal3d26").keypoints;
@@ -154,7 +154,7 @@ std::string keypoints_part() {
   return text;
 }
 
-// The lines can be pasted into a shell, remarks included.
+// Lists the next commands. The lines, with their comments, can be pasted into a shell.
 std::string next_part(const PublishedDataset& dataset) {
   const std::string folder = dataset.folder().string();
   VerdictReader verdicts(dataset.verdicts_file());

@@ -12,7 +12,7 @@ namespace {
 
 using manifests::Judgement;
 
-// Every member, once for writing and reading.
+// Visits every member, so that writing and reading share one list.
 template <typename SomeJudgement, typename Visitor>
 void visit(SomeJudgement& judgement, Visitor&& visitor) {
   visitor(judgement.verdict);

@@ -1,4 +1,4 @@
-// The verdicts of a run, unit by unit. They lie on disk, so that their number is not bounded by memory.
+// The verdicts of a run, unit by unit. They are kept on disk, so that memory does not limit their number.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +15,7 @@
 
 namespace q3d::pipeline::dataset {
 
-// Members that reach the disk throw manifests::IoError.
+// Members that access the disk throw manifests::IoError.
 class JudgementList {
  public:
   // The verdicts go to a file without a name in `folder` (manifests/spill_file.h), which is made with the
@@ -27,7 +27,7 @@ class JudgementList {
   void set(std::int64_t unit, std::span<const manifests::Judgement> judgements);
   bool has(std::int64_t unit) const { return places_.at(static_cast<std::size_t>(unit)).has_value(); }
   std::size_t units() const { return places_.size(); }
-  // Throws std::logic_error if the unit has none yet.
+  // Returns the verdicts of a unit. Throws std::logic_error if it has none yet.
   std::vector<manifests::Judgement> of(std::int64_t unit) const;
 
  private:

@@ -22,15 +22,15 @@ std::string text_of(const json& value) {
   return value.is_null() ? std::string() : value.get<std::string>();
 }
 
-// A text that becomes a part of a folder's name: the dataset's name, or a stage's key. A stranger who makes a
-// dataset.json must not be able to choose another folder by it.
+// Checks a text that becomes part of a folder's name: the dataset's name, or a stage's key. The author of a
+// dataset.json must not be able to choose another folder with it.
 std::string name_of(const char* what, std::string text) {
   if (manifests::is_file_name(text)) return text;
   throw std::runtime_error(fmt::format(
       "{} is {}, expected a name without '/', '\\\\', ':' and control characters", what, json(text).dump()));
 }
 
-// Null where there is no such stage.
+// Returns the key of a stage, which is null in the file if there is no such stage.
 std::string key_of_stage(const json& keys, const char* stage) {
   const std::string key = text_of(keys.at(stage));
   return key.empty() ? key : name_of(stage, key);
@@ -42,7 +42,7 @@ Counts counts_of(const json& counts) {
           whole_number_at(counts, "failed")};
 }
 
-// Counts by the names of enumerators.
+// Reads counts by the names of enumerators.
 template <typename Enum>
 std::map<Enum, std::int64_t> tally_of(const json& object, Enum (*from_string)(std::string_view)) {
   std::map<Enum, std::int64_t> tally;
@@ -71,7 +71,7 @@ void read_statistics(const json& statistics, DatasetManifest& manifest) {
   }
 }
 
-// Null where no label is a prediction.
+// Reads the thresholds, which are null if no label is a prediction.
 void read_thresholds(const json& thresholds, DatasetManifest& manifest) {
   if (thresholds.is_null()) return;
   for (const auto& [name, values] : thresholds.items()) {
@@ -96,7 +96,7 @@ void read_warnings(const json& warnings, DatasetManifest& manifest) {
   }
 }
 
-// The config stands there as the user wrote it: what is absent has its default.
+// Reads the config. It is stored as the user wrote it, so an absent key has its default.
 void read_config(const json& config, DatasetManifest& manifest) {
   for (const json& dataset : config.at("datasets")) {
     const std::string name =

@@ -26,7 +26,7 @@ bool is_below_tau_low(const Judgement& judgement, const Thresholds& thresholds) 
   return judgement.initial_error < thresholds.tau_low;
 }
 
-// The course of adaptation of a candidate that was adapted, whether it was kept or not.
+// Describes the adaptation of a candidate that was adapted, whether it was kept or not.
 std::string adaptation(const Judgement& judgement, const Thresholds& thresholds) {
   const std::string why_adapted =
       is_below_tau_low(judgement, thresholds)
@@ -48,7 +48,7 @@ std::string gain(const Judgement& judgement, const Thresholds& thresholds, const
                      100 * judgement.gain, relation, 100 * thresholds.delta);
 }
 
-// The numbers behind a reason of the fidelity rule itself; empty for every other reason.
+// Returns the numbers behind a reason of the fidelity rule itself; empty for every other reason.
 std::string numbers(const Judgement& judgement, const std::optional<Thresholds>& thresholds) {
   if (!thresholds) return {};
   if (judgement.reason == Reason::error_too_large) {
@@ -93,12 +93,12 @@ std::string why_kept(const Judgement& judgement, config::Role role,
   if (judgement.gain >= thresholds->delta) {
     return course + gain(judgement, *thresholds, "reaches") + ", so it was kept.";
   }
-  // tta.stop_below, or the early end of version 0.1.
+  // This happens with tta.stop_below, and in version 0.1, which ended adaptation early.
   return course + "Adaptation was told to end there before its gain was asked for, so it was kept.";
 }
 
-// A mean L_proj in words. On the rendered world, whose truth is known, labels at these bounds have an AUC of
-// about 93 and 87 (docs/results.md).
+// Describes a mean L_proj in words. On the rendered world, whose truth is known, labels at these bounds have
+// an AUC of about 93 and 87 (docs/results.md).
 std::string_view in_words(double mean_error) {
   if (mean_error < 0.02) return "close to";
   if (mean_error < 0.04) return "near";

@@ -1,5 +1,5 @@
-// Sentences for people: what a verdict, a reason and a kind of label mean, and what decided about a
-// candidate.
+// Makes sentences for people: the meaning of a verdict, a reason and a kind of label, and the grounds of a
+// candidate's verdict.
 #pragma once
 
 #include <optional>
@@ -25,8 +25,8 @@ std::string why(const manifests::Judgement& judgement, config::Role role,
 
 struct DatasetManifest;
 
-// Returns a text that says how good the labels are: how far they lie from the annotated keypoints, on the
-// scale of the crop, and what this does not prove.
+// Returns a text about the quality of the labels: their distance from the annotated keypoints, relative to
+// the crop, and what this distance does not prove.
 std::string quality_sentence(const DatasetManifest& manifest);
 
 }  // namespace q3d::pipeline::dataset

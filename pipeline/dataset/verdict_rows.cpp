@@ -13,12 +13,12 @@ namespace {
 
 using manifests::csv_cell;
 
-// Shortest text that reads back as the same number; empty for NaN.
+// Returns the shortest text that reads back as the same number; empty for NaN.
 std::string number(double value) {
   return std::isnan(value) ? std::string() : fmt::format("{}", value);
 }
 
-// The cells of the trust scores, each after its comma.
+// Returns the cells of the trust scores, each after its comma.
 std::string trust_cells(const manifests::TrustScores& trust) {
   std::string cells;
   for (const manifests::TrustColumn& column : manifests::kTrustColumns) {

@@ -1,4 +1,4 @@
-// The lines of verdicts.csv, as they are written. verdicts.h reads them.
+// Writes the lines of verdicts.csv, which verdicts.h reads.
 #pragma once
 
 #include <cstdint>
@@ -9,11 +9,11 @@
 
 namespace q3d::pipeline::dataset {
 
-// The first line.
+// Returns the first line.
 std::string verdict_header();
 
-// A candidate's line. `row` is the place of its sample in the shard of its unit. Shard and row are those of
-// the kept ones; a trust score that was not measured is an empty cell.
+// Returns a candidate's line. `row` is the position of its sample in the shard of its unit. Shard and row are
+// empty cells unless the candidate is kept; so is a trust score that was not measured.
 std::string verdict_row(const candidates::Candidate& candidate, const manifests::Judgement& judgement,
                         std::int64_t unit, std::int64_t row);
 

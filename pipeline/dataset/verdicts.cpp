@@ -56,7 +56,7 @@ std::optional<VerdictRow> VerdictReader::next() {
     std::optional<VerdictRow> row = parse();
     ++position_;
     return row;
-  } catch (const std::invalid_argument& error) {  // of a name
+  } catch (const std::invalid_argument& error) {  // from a name that is no enumerator's
     table_.fail(error.what(), "one of these");
   }
 }

@@ -1,4 +1,4 @@
-// verdicts.csv of a published dataset, row by row: what became of every candidate.
+// Reads verdicts.csv of a published dataset row by row. It has the verdict on every candidate.
 #pragma once
 
 #include <array>
@@ -27,7 +27,7 @@ struct VerdictRow {
   std::string source;
   std::string species;
   manifests::Family family = manifests::Family::none;
-  std::optional<LabelPlace> label;  // of the kept ones
+  std::optional<LabelPlace> label;  // set if the candidate is kept
   std::string image_sha256;
 
   // Returns whether the fidelity rule saw a prediction of the candidate, so that initial_error is a number.
@@ -42,9 +42,9 @@ class VerdictReader {
   VerdictReader(const VerdictReader&) = delete;
   VerdictReader& operator=(const VerdictReader&) = delete;
 
-  // The next candidate, or nothing at the end. Throws std::runtime_error that names file and line for a name
-  // that is no enumerator's, for a cell that is no number, and for a row that contradicts itself: a kept
-  // candidate has a row in a shard and no reason, every other has a reason and no row.
+  // Returns the next candidate, or nothing at the end. Throws std::runtime_error that names file and line for
+  // a name that is no enumerator's, for a cell that is no number, and for a row that contradicts itself: a
+  // kept candidate has a row in a shard and no reason, every other has a reason and no row.
   std::optional<VerdictRow> next();
 
  private:

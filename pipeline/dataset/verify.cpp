@@ -31,8 +31,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// float32 projection and its double re-computation differ by rounding only: of numbers below 1 by this, of
-// larger ones by as much of them.
+// The float32 projection and its recomputation in double differ by rounding only. This tolerance is absolute
+// for numbers below 1 and relative for larger ones.
 constexpr double kProjectionTolerance = 1e-4;
 constexpr float kRotationTolerance = 1e-5F;
 
@@ -148,7 +148,7 @@ class Verifier {
     if (is_predicted || unit::has_projection(sample.projected_2d)) check_projection(entry, sample);
   }
 
-  // The label of a truth is the annotation's own body.
+  // Checks that the label of a truth is the annotation's own body.
   void check_truth(const ShardEntry& entry, const manifests::ShardSample& sample) {
     const auto& truth = sample.record.truth;
     const device::BodyPrediction body = truth ? unit::annotated_body(*truth) : unit::no_body();
@@ -165,7 +165,8 @@ class Verifier {
                         sample.record.id));
   }
 
-  // The stored 2D points are the projection of the stored body, and the error is theirs.
+  // Checks that the stored 2D points are the projection of the stored body, and that the stored error is
+  // theirs.
   void check_projection(const ShardEntry& entry, const manifests::ShardSample& sample) {
     double worst = 0.0;  // relative for what lies far outside the crop
     for (int k = 0; k < manifests::kNumKeypoints; ++k) {
@@ -218,7 +219,7 @@ class Verifier {
     }
   }
 
-  // verdicts.csv tells of the same candidates as dataset.json and the shards.
+  // Checks that verdicts.csv has the same candidates as dataset.json and the shards.
   void check_verdicts() {
     Counts counts;
     std::size_t kept = 0;
@@ -261,7 +262,7 @@ class Verifier {
     }
   }
 
-  // A file that dataset.json does not list is not part of the dataset.
+  // Reports files that dataset.json does not list, because they are not part of the dataset.
   void check_strays() {
     std::set<std::string> listed{"dataset.json", "verdicts.csv", "shards"};
     for (const ShardEntry& entry : dataset_.manifest().shards) listed.insert(entry.file);

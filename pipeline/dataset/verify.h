@@ -1,4 +1,4 @@
-// `verify`: reads a finished dataset whole and checks everything that can be checked.
+// `verify`: reads a whole finished dataset and checks everything that can be checked.
 #pragma once
 
 #include <cstdint>
@@ -8,10 +8,10 @@
 
 namespace q3d::pipeline::dataset {
 
-// A file whose bytes are not those that were recorded for it.
+// A file whose bytes differ from the recorded digest.
 struct Damage {
   std::filesystem::path file;
-  std::string expected;  // SHA-256; empty for what has none: a journal, a stage's manifest
+  std::string expected;  // SHA-256; empty for a file without one: a journal or a stage's manifest
 };
 
 struct VerifySummary {
@@ -20,8 +20,8 @@ struct VerifySummary {
   std::int64_t samples = 0;
   std::int64_t pictures = 0;          // stored crops that were decoded
   std::int64_t stage_files = 0;       // units' files of the stages that were read
-  std::vector<std::string> problems;  // empty when the dataset is sound
-  std::vector<Damage> damage;         // those of the problems that another copy of the file would mend
+  std::vector<std::string> problems;  // empty if the dataset is undamaged
+  std::vector<Damage> damage;         // the problems that another copy of the file would solve
 };
 
 // Recomputes every digest from the bytes (no cache), reads every shard through its schema, decodes every

@@ -15,7 +15,7 @@ namespace q3d::pipeline::dataset {
 enum class WarningKind : std::uint8_t {
   above_ceiling,     // tau_high is above filter.tau_ceiling
   outside_domain,    // the pool's errors lie far outside those of the network's own pictures
-  rendered_network,  // a network that knows rendered pictures alone labels photographs
+  rendered_network,  // a network that knows only rendered pictures labels photographs
   rendered_body,     // the rendered world's body model stands for animals on photographs
 };
 std::string_view to_string(WarningKind kind);                 // the enumerator's name
@@ -24,12 +24,12 @@ std::span<const std::string_view> warning_kind_names();
 
 struct Warning {
   WarningKind kind = WarningKind::outside_domain;
-  std::string dataset;  // its name in the config; empty if the warning is of all datasets
+  std::string dataset;  // its name in the config; empty if the warning concerns all datasets
   std::string message;  // a sentence or more for people, with the numbers
   bool operator==(const Warning&) const = default;
 };
 
-// A list of {"kind", "dataset", "message"}; the dataset is null for a warning of all of them.
+// Returns a list of {"kind", "dataset", "message"}. The dataset is null for a warning about all of them.
 nlohmann::ordered_json to_json(const std::vector<Warning>& warnings);
 
 }  // namespace q3d::pipeline::dataset

@@ -27,7 +27,7 @@ ordered_json to_json(const Counts& counts) {
           {"failed", counts.failed}};
 }
 
-struct Mean {  // of the errors that were computed
+struct Mean {  // mean of the errors that were computed
   double sum = 0.0;
   std::int64_t count = 0;
   void add(double error) {
@@ -81,8 +81,8 @@ void unite(ordered_json& target, const ordered_json& source, const std::string& 
   }
 }
 
-// Digests of annotation files. A dataset of which the sources read other files has null; provenance.derived
-// has both.
+// Adds the digests of annotation files. If the sources read different files for a dataset, its digest is
+// null; provenance.derived has all of them.
 void add_annotations(ordered_json& target, const ordered_json& source) {
   for (const auto& [name, digest] : source.items()) {
     const bool differs = target.contains(name) && target.at(name) != digest;
@@ -90,7 +90,7 @@ void add_annotations(ordered_json& target, const ordered_json& source) {
   }
 }
 
-// The value that all sources share, or null.
+// Returns the value that all sources share, or null.
 ordered_json common(const std::vector<ordered_json>& documents, const char* key) {
   const ordered_json first = documents.front().at("provenance").value(key, ordered_json());
   const bool is_common = std::all_of(documents.begin(), documents.end(), [&](const ordered_json& document) {
@@ -139,7 +139,7 @@ ordered_json labels(const std::vector<Selection>& selections) {
   return object;
 }
 
-// Terms of the datasets, also of versions of schema 1, which state none.
+// Returns the terms of the datasets, also for versions of schema 1, which state none.
 ordered_json datasets_of(const Selection& selection, const ordered_json& document) {
   if (document.contains("datasets")) return document.at("datasets");
   ordered_json datasets = ordered_json::object();
@@ -150,7 +150,7 @@ ordered_json datasets_of(const Selection& selection, const ordered_json& documen
   return datasets;
 }
 
-// The datasets of all sources' configs, each once.
+// Returns the datasets of all sources' configs, each once.
 ordered_json united_config(const std::vector<Selection>& selections,
                            const std::vector<ordered_json>& documents) {
   ordered_json datasets = ordered_json::array();

@@ -53,7 +53,7 @@ class ShardWriter {
  public:
   ShardWriter(const fs::path& folder, DerivedVersion& result) : folder_(folder), result_(result) {
     fs::create_directories(folder_ / "shards");
-    manifests::remove_temporaries(folder_);  // what a run that was killed left
+    manifests::remove_temporaries(folder_);  // of a killed run
     manifests::remove_temporaries(folder_ / "shards");
   }
 

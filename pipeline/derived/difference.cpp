@@ -21,7 +21,7 @@ using dataset::VerdictRow;
 using manifests::ShardSample;
 using nlohmann::ordered_json;
 
-constexpr std::size_t kShownLines = 10;  // of each list on the page
+constexpr std::size_t kShownLines = 10;  // lines of each list on the page
 
 double distance(std::span<const float> a, std::span<const float> b) {
   double sum = 0.0;
@@ -29,7 +29,7 @@ double distance(std::span<const float> a, std::span<const float> b) {
   return std::sqrt(sum);
 }
 
-// The mean angle of the rotations that lead from one pose to the other.
+// Returns the mean angle between the joints' rotations in two poses.
 double mean_angle_deg(const smal::Pose& a, const smal::Pose& b) {
   double sum = 0.0;
   for (std::size_t joint = 0; joint < manifests::kNumJoints; ++joint) {
@@ -65,7 +65,7 @@ LabelChange change_of(const ShardSample& a, const ShardSample& b) {
           1000.0 * distance(a.body.translation, b.body.translation)};
 }
 
-// The samples of one shard after the other, each shard opened once.
+// Reads samples shard after shard, so that each shard is opened once.
 class Samples {
  public:
   explicit Samples(const PublishedDataset& dataset) : dataset_(dataset) {}

@@ -1,4 +1,4 @@
-// `diff`: what changed between two versions, candidate by candidate.
+// `diff`: shows what changed between two versions, candidate by candidate.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -14,7 +14,7 @@
 
 namespace q3d::pipeline::derived {
 
-// Says how far a label moved whose candidate both versions keep.
+// The change of a label whose candidate both versions keep.
 struct LabelChange {
   std::string id;
   double error_before = 0.0;  // L_proj in crop units; NaN where it was not computed
@@ -26,21 +26,21 @@ struct LabelChange {
 };
 
 struct VersionDifference {
-  std::string before;  // the versions' names
+  std::string before;  // name of the version
   std::string after;
   std::int64_t in_both = 0;
   std::vector<std::string> only_before;  // ids of candidates
   std::vector<std::string> only_after;
-  // Holds the candidates of both versions whose verdict differs, by (before, after).
+  // The candidates of both versions whose verdict differs, by (before, after).
   std::map<std::pair<manifests::Verdict, manifests::Verdict>, std::vector<std::string>> verdicts;
-  std::int64_t equal_labels = 0;    // kept in both, every number of the label equal
-  std::vector<LabelChange> labels;  // kept in both with another label, the largest change of keypoints first
+  std::int64_t equal_labels = 0;    // candidates that both keep, with all numbers of the label equal
+  std::vector<LabelChange> labels;  // kept in both and changed, the largest change of keypoints first
 };
 
 // Throws std::runtime_error for versions that cannot be read, and Interrupted.
 VersionDifference compare_versions(const std::filesystem::path& before, const std::filesystem::path& after);
 
-// Everything, and a page for people.
+// These return the whole difference, and a page for people.
 nlohmann::ordered_json to_json(const VersionDifference& difference);
 std::string page_of(const VersionDifference& difference);
 

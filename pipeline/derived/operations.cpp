@@ -32,7 +32,7 @@ MergeSummary merge(const std::vector<fs::path>& versions, const fs::path& out, c
   MergeSummary summary;
   std::vector<Selection> selections;
   std::unordered_set<std::string> ids;
-  std::unordered_set<std::string> pictures;  // of the versions before
+  std::unordered_set<std::string> pictures;  // pictures of the earlier versions
   for (const fs::path& folder : versions) {
     Selection selection{PublishedDataset(folder), {}};
     std::vector<std::string> own_pictures;

@@ -1,4 +1,4 @@
-// `merge` and `subset`: which candidates of finished versions a new one has.
+// `merge` and `subset`: make a new version from candidates of finished ones.
 #pragma once
 
 #include <cstdint>
@@ -18,13 +18,13 @@ struct MergeSummary {
                                    // under another id: kept
 };
 
-// Joins versions. Of candidates with one id, the first version's is taken. An empty `name` joins the sources'
-// names by "+". Throws as write_derived does.
+// Joins versions. If several candidates have the same id, that of the first version is taken. An empty `name`
+// joins the sources' names by "+". Throws as write_derived does.
 MergeSummary merge(const std::vector<std::filesystem::path>& versions, const std::filesystem::path& out,
                    const std::string& name, const std::string& version);
 
-// The candidates that fulfil a condition (where.h). An empty `name` takes the source's. Throws as parse_where
-// and write_derived do.
+// Makes a version of the candidates that fulfil a condition (where.h). An empty `name` takes the source's.
+// Throws as parse_where and write_derived do.
 DerivedVersion subset(const std::filesystem::path& version_folder, const std::string& where,
                       const std::filesystem::path& out, const std::string& name, const std::string& version);
 

@@ -63,7 +63,7 @@ const std::map<std::string, NumberOf>& number_fields() {
 
 struct Token {
   std::string text;
-  std::size_t at = 0;  // in the condition, from 0
+  std::size_t at = 0;  // position in the condition, from 0
   bool is_quoted = false;
 };
 
@@ -145,7 +145,7 @@ class Parser {
   }
 
   Condition not_part() {
-    // Parsing and asking recurse, so a text must not be able to choose how deep.
+    // Parsing and evaluation recurse, so a text must not be able to choose the depth.
     constexpr int kMostParts = 1000;
     if (++parts_ > kMostParts) {
       throw run::ConfigError(fmt::format(
@@ -192,7 +192,8 @@ class Parser {
     fail(is_number ? "=, !=, <, <=, > or >=" : "= or !=, since the field holds texts");
   }
 
-  // Fields with few names are compared with one of these, or with "" where there may be none.
+  // Checks that a field with a fixed set of names is compared with one of them, or with "" if it may be
+  // empty.
   void check_name(const std::string& field) const {
     const std::string& value = tokens_[next_].text;
     std::span<const std::string_view> names;
@@ -227,7 +228,7 @@ class Parser {
   std::string text_;
   std::vector<Token> tokens_;
   std::size_t next_ = 0;
-  int parts_ = 0;  // that were begun
+  int parts_ = 0;  // parts that were begun
 };
 
 }  // namespace

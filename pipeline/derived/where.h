@@ -1,4 +1,4 @@
-// Conditions on candidates: `species = lion and trust > 0.8`.
+// Parses conditions on candidates: `species = lion and trust > 0.8`.
 #pragma once
 
 #include <functional>
@@ -10,7 +10,7 @@
 
 namespace q3d::pipeline::derived {
 
-// A condition may ask for these facts of a candidate: its row of verdicts.csv, and the kind of its label.
+// The facts of a candidate that a condition may use: its row of verdicts.csv, and the kind of its label.
 struct WhereRow {
   const dataset::VerdictRow& verdict;
   std::optional<manifests::LabelKind> label_kind;  // nothing unless it is kept

@@ -1,4 +1,5 @@
-// The body model alone: bodies posed for measurement, without the network and without LibTorch.
+// The interface of the body model alone, which poses bodies for measurement. It needs neither the network nor
+// LibTorch's headers.
 #pragma once
 
 #include <array>
@@ -36,14 +37,14 @@ class BodyMeshes {
   BodyMeshes& operator=(const BodyMeshes&) = delete;
   virtual ~BodyMeshes() = default;
 
-  // Triangles of every mesh: three vertices each.
+  // Returns the triangles of every mesh, each as three vertices.
   virtual std::vector<std::array<std::int32_t, 3>> faces() const = 0;
 
   // Returns the meshes of the bodies from their poses and betas. Their translations are not added.
   virtual std::vector<BodyMesh> pose(std::span<const smal::Body> bodies) const = 0;
 };
 
-// Loads the body model of an asset file. Throws std::runtime_error naming file and tensor.
+// Loads the body model of an asset file. Throws std::runtime_error that names file and tensor.
 using BodyMeshesLoader = std::function<std::unique_ptr<BodyMeshes>(const std::filesystem::path& smal_asset)>;
 
 }  // namespace q3d::pipeline::device

@@ -1,4 +1,4 @@
-// One thread that owns the network: it takes units one by one and gives them back when it is done with them.
+// The thread that owns the network. It processes units one by one.
 #pragma once
 
 #include <condition_variable>
@@ -9,8 +9,9 @@
 
 namespace q3d::pipeline::device {
 
-// Runs jobs in the order they were posted, all on the same thread: LibTorch's CPU operators keep a pool of
-// threads for each calling thread, and a task scheduler's workers would each grow their own.
+// Runs jobs in the order in which they were posted, all on the same thread. LibTorch's CPU operators keep a
+// thread pool for each calling thread, so every worker of a task scheduler would otherwise create its own
+// pool.
 class DeviceWorker {
  public:
   DeviceWorker();

@@ -1,4 +1,5 @@
-// The network as the pipeline sees it: plain pictures and keypoints in, plain numbers out, without LibTorch.
+// The pipeline's interface of the network. It takes plain pictures and keypoints and returns plain numbers,
+// without LibTorch.
 #pragma once
 
 #include <array>
@@ -29,7 +30,8 @@ bool is_finite(const BodyPrediction& body);
 using smal::CropKeypoints;
 using PatchView = std::span<const std::uint8_t>;  // 256 x 256 x 3 RGB, row-major
 
-// What a network's encoders made of one picture. Only the network that made it can use it.
+// The features that a network's encoders computed for one picture. Only the network that made them can use
+// them.
 class PictureFeatures {
  public:
   PictureFeatures() = default;
@@ -40,8 +42,8 @@ class PictureFeatures {
 using KeptFeatures = std::shared_ptr<const PictureFeatures>;
 
 struct AdaptRequest {
-  PatchView patch;        // not looked at if features are given
-  KeptFeatures features;  // of the same picture, from `predict`; or null
+  PatchView patch;        // unused if features are given
+  KeptFeatures features;  // features of the same picture from `predict`, or null
   CropKeypoints keypoints{};
   filters::adaptation::Schedule schedule;
 };
@@ -49,13 +51,13 @@ struct AdaptRequest {
 struct AdaptOutcome {
   BodyPrediction best;
   std::vector<double> curve;           // L_proj of iterates 0..n over all visible keypoints, crop units
-  std::vector<double> held_out_curve;  // of the held-out ones alone; empty where there are none
+  std::vector<double> held_out_curve;  // the same over the held-out keypoints only; empty if there are none
   int best_iteration = 0;
-  std::vector<BodyPrediction> snapshots;  // of the iterates that were asked for
+  std::vector<BodyPrediction> snapshots;  // bodies of the requested iterates
 };
 
-// A loaded network. One caller at a time. Batches are formed from the elements of the span in their order, so
-// a result depends on nothing but the span. pipeline/network makes one.
+// A loaded network. Only one thread may call it at a time. Batches are formed from the elements of the span
+// in their order, so a result depends on nothing but the span. pipeline/network makes one.
 class Network {
  public:
   Network() = default;
@@ -63,21 +65,21 @@ class Network {
   Network& operator=(const Network&) = delete;
   virtual ~Network() = default;
 
-  // `features`, unless it is null, gets an entry for each patch: its features, or null where the network
-  // would make others of the same picture in another batch. So adaptation gives the same bits with kept
-  // features and without.
+  // `features`, unless it is null, receives an entry for each patch: its features, or null if the network
+  // would compute different ones for the same picture in another batch. So adaptation gives the same bits
+  // with and without kept features.
   virtual std::vector<BodyPrediction> predict(std::span<const PatchView> patches,
                                               std::vector<KeptFeatures>* features = nullptr) = 0;
   // Adapts some requests at a time; when one ends, the next takes its place. `snapshots`: iterates to keep
-  // beside the best one, ascending; an instance that stopped before shows its last iterate. `progress` is
-  // told how many requests have ended, whenever some have.
+  // beside the best one, ascending; for a request that ended earlier, the last iterate is returned.
+  // `progress` is called with the number of requests that have ended, whenever some end.
   virtual std::vector<AdaptOutcome> adapt(std::span<const AdaptRequest> requests,
                                           const std::vector<int>& snapshots = {},
                                           const std::function<void(std::size_t ended)>& progress = {}) = 0;
 
-  // "cpu (2 threads)", "cuda:0 NVIDIA H100 80GB HBM3": for people.
+  // Returns the device for people: "cpu (2 threads)", "cuda:0 NVIDIA H100 80GB HBM3".
   virtual const std::string& device_description() const = 0;
-  // A GPU that is present but cannot be used, and why; else empty.
+  // Names a GPU that is present but cannot be used, and says why; else empty.
   virtual const std::string& device_warning() const = 0;
 };
 

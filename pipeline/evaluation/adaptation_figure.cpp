@@ -36,7 +36,7 @@ struct Range {
   double to;
 };
 
-// What stands on the x axis of a row of panels.
+// The x axis of a row of panels.
 struct Axis {
   const char* title;
   bool (*is_on)(const Setting&);

@@ -1,4 +1,4 @@
-// The curves of the paper's study of adaptation: quality by iterations, and by the share of visible
+// Draws the curves of the paper's study of adaptation: quality over iterations, and over the share of visible
 // keypoints.
 #pragma once
 

@@ -30,12 +30,12 @@ std::set<std::string> dataset_names(const json& annotations) {
   return names;
 }
 
-// SHA-256 of a list that the config may name, or null.
+// Returns the SHA-256 of a list that the config may name, or null.
 json digest_of(const fs::path& file) {
   return file.empty() ? json() : json(manifests::sha256_file(file));
 }
 
-// The same, as dataset.json has it. Versions before 0.3 know no corrections.
+// Returns the digest of that list in dataset.json, or null. Versions before 0.3 have no corrections.
 json built_digest(const json& provenance, const char* list) {
   const json built = provenance.value(list, json());
   return built.is_null() ? built : built.at("sha256");

@@ -15,9 +15,9 @@ struct BuiltVersion {
 };
 
 // Returns the finished dataset below `out` that was built with these keys (stages::keys_of_config) and with
-// the config's version, datasets, veto list and test sets. If several were, because pictures were added
-// between builds, it returns the newest one, to which `latest` points. Throws std::runtime_error if there is
-// none, or if `latest` points to none of several.
+// the config's version, datasets, veto list and test sets. If there are several, because pictures were added
+// between builds, it returns the one to which `latest` points. Throws std::runtime_error if there is none, or
+// if `latest` points to none of several.
 BuiltVersion find_built_version(const config::BuildConfig& config, const stages::StageKeys& keys,
                                 const std::filesystem::path& out);
 

@@ -31,7 +31,7 @@ class PairedSamples {
     for (const std::string& id : ids_) require_one_normaliser(id);
   }
 
-  // Nothing where no sample has the metric.
+  // Returns nothing if no sample has the metric.
   std::optional<ComparisonRow> row(Metric metric, const filters::BootstrapOptions& bootstrap) const {
     const std::size_t pairs = runs_.size() / 2;
     ComparisonRow row;
@@ -186,7 +186,7 @@ class Comparer {
   }
 
   void add_rows(const std::string& dataset, const std::string& before, const std::string& after) {
-    static const std::vector<StoredSample> kNone;  // every sample of a setting may have been left out
+    static const std::vector<StoredSample> kNone;  // used if every sample of a setting was left out
     std::vector<const std::vector<StoredSample>*> runs;
     for (std::size_t i = 0; i < evaluations_.size(); ++i) {
       const auto& settings = evaluations_[i]->datasets.at(dataset).settings;

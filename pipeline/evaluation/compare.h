@@ -1,5 +1,5 @@
-// `compare`: is one network better than another on the same pictures? A paired bootstrap over pictures and,
-// where several pairs of evaluations (seeds) are given, over pairs.
+// `compare`: tests whether one network is better than another on the same pictures. It uses a paired
+// bootstrap over pictures and, if several pairs of evaluations (seeds) are given, over pairs.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -15,18 +15,19 @@ namespace q3d::pipeline::evaluation {
 
 struct CompareOptions {
   filters::BootstrapOptions bootstrap;
-  // Settings to set against each other; empty = each setting that all evaluations have, against itself.
+  // The two settings that are compared. If they are empty, each setting that all evaluations have is compared
+  // with itself.
   std::string before_setting;
   std::string after_setting;
 };
 
-// The means are those over samples and pairs.
+// The means are taken over samples and pairs.
 struct ComparisonRow : ComparedMeans {
   std::string dataset;
   std::string before_setting;
   std::string after_setting;
-  std::int64_t samples = 0;   // with a value in every evaluation
-  std::int64_t unpaired = 0;  // with a value in some only, and so left out
+  std::int64_t samples = 0;   // samples with a value in every evaluation
+  std::int64_t unpaired = 0;  // samples with a value in only some evaluations, which are left out
   std::int64_t pictures = 0;
 };
 
@@ -37,9 +38,10 @@ struct Comparison {
   std::vector<std::string> notes;  // what could not be compared
 };
 
-// before[i] and after[i] are a pair. Better or worse: the interval leaves out 0. Throws std::invalid_argument
-// when the lists do not pair or a setting is not there, std::runtime_error when two evaluations of one
-// dataset differ in annotations, truth or normaliser, or have nothing in common.
+// before[i] and after[i] are a pair. A difference counts as better or worse if its interval excludes 0.
+// Throws std::invalid_argument if the lists have different lengths or a setting does not exist, and
+// std::runtime_error if two evaluations of one dataset differ in annotations, truth or normaliser, or have
+// nothing in common.
 Comparison compare(const std::vector<StoredEvaluation>& before, const std::vector<StoredEvaluation>& after,
                    const CompareOptions& options);
 

@@ -29,7 +29,7 @@ Kept kept_labels(const StoredLabels& labels) {
   return kept;
 }
 
-// The `count` labels of least L_proj.
+// Returns the `count` labels of least L_proj.
 Kept cut(const Kept& kept, std::size_t count) {
   std::vector<std::pair<double, std::string>> order;
   for (const auto& [id, label] : kept) {
@@ -60,13 +60,13 @@ void require_one_pool(const StoredLabels& before, const StoredLabels& after) {
                   before.folder, before.candidates.size(), after.folder, after.candidates.size()));
 }
 
-// The labels that are compared, pair by pair.
+// The labels that are compared, for each pair.
 struct Sets {
   std::vector<Kept> before;
   std::vector<Kept> after;
 };
 
-// All items of a pool under numbers, and their pictures' numbers.
+// Numbers all items of a pool and their pictures.
 class Items {
  public:
   explicit Items(const std::vector<StoredLabels>& pools) {
@@ -80,7 +80,7 @@ class Items {
   }
   const std::vector<std::size_t>& pictures() const { return picture_of_item_; }
 
-  // runs x items; NaN where an item is not kept or has no such value.
+  // Returns runs x items values, NaN where an item is not kept or has no such value.
   std::vector<double> values(const std::vector<Kept>& runs, Metric metric) const {
     std::vector<double> values(runs.size() * numbers_.size(), kNone);
     for (std::size_t r = 0; r < runs.size(); ++r) {
@@ -97,7 +97,7 @@ class Items {
   std::vector<std::size_t> picture_of_item_;
 };
 
-// Number and mean of what is not NaN.
+// Returns the number and the mean of the values that are not NaN.
 std::pair<std::int64_t, double> count_and_mean(const std::vector<double>& values) {
   std::int64_t count = 0;
   double sum = 0.0;

@@ -14,7 +14,7 @@ namespace {
 
 using manifests::Reason;
 
-constexpr std::size_t kUnitSize = 64;  // batches form inside a unit, so it is part of the numbers' last bits
+constexpr std::size_t kUnitSize = 64;  // batches form inside a unit, so this affects the results' last bits
 
 std::vector<candidates::Unit> cut_units(std::size_t candidates) {
   std::vector<candidates::Unit> units;
@@ -30,7 +30,7 @@ std::vector<candidates::Unit> cut_units(std::size_t candidates) {
 
 // The samples of a unit that have a picture and a finite prediction.
 struct Measurable {
-  std::vector<std::size_t> samples;  // into the results
+  std::vector<std::size_t> samples;  // indices into the results
   std::vector<device::PatchView> patches;
   std::vector<device::BodyPrediction> bodies;
   std::vector<Target> targets;
@@ -129,7 +129,7 @@ class RecordEvaluator {
     return unit;
   }
 
-  // Measures what one pass gives; returns the setting after its last.
+  // Measures the results of one pass. Returns the index after the pass's last setting.
   std::size_t adapt(const TtaPass& pass, std::size_t setting, const Measurable& unit) {
     run::throw_if_interrupted();
     std::vector<device::AdaptRequest> requests;
@@ -176,7 +176,7 @@ class RecordEvaluator {
   run::Progress& progress_;
   std::vector<candidates::Candidate> candidates_;
   std::vector<candidates::Unit> units_;
-  std::vector<SampleResult> results_;  // a unit's own are written on the device's thread alone
+  std::vector<SampleResult> results_;  // written on the device's thread only
 };
 
 }  // namespace

@@ -1,4 +1,4 @@
-// One test set through the network, unit by unit: decode, predict, adapt, measure.
+// Runs one test set through the network, unit by unit: decode, predict, adapt, measure.
 #pragma once
 
 #include <functional>
@@ -19,8 +19,8 @@ struct Instruments {
   std::uint64_t seed = 0;
 };
 
-// The records' results, in their order; a record that a loader failed keeps its failure, but for
-// no_visible_keypoints, which has 3D metrics all the same. Throws std::runtime_error, Interrupted.
+// Returns the results of the records, in their order. A record that a loader failed keeps its failure, except
+// no_visible_keypoints, because such a record still has 3D metrics. Throws std::runtime_error, Interrupted.
 std::vector<SampleResult> evaluate_records(std::vector<manifests::SampleRecord> records,
                                            const Instruments& instruments, run::Progress& progress);
 

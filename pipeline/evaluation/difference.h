@@ -1,5 +1,5 @@
-// The comparison of two networks and that of two sets of labels share this: a difference with its bootstrap
-// interval, in words, in JSON and in a table.
+// A difference with its bootstrap interval, in words, in JSON and in a table. The comparison of two networks
+// and that of two sets of labels share it.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -16,13 +16,13 @@ namespace q3d::pipeline::evaluation {
 enum class Finding { better, worse, no_difference_shown };
 std::string_view to_string(Finding finding);  // "better", "worse", "no difference shown"
 
-// Better or worse only where the interval of after - before leaves out 0.
+// Returns better or worse only if the interval of after - before excludes 0.
 Finding finding(const filters::BootstrapInterval& difference, bool higher_is_better);
 
-// Throws std::invalid_argument unless there are as many of `what` before as after, 1 or more.
+// Throws std::invalid_argument unless `before` and `after` have the same number of `what`, 1 or more.
 void require_pairs(std::size_t before, std::size_t after, std::string_view what);
 
-// The picture of a sample: its id, dataset/split/picture#annotation, without the annotation.
+// Returns the picture of a sample, which is its id (dataset/split/picture#annotation) without the annotation.
 std::string picture_of(const std::string& sample_id);
 
 // The values that every row of a comparison holds.
@@ -39,7 +39,7 @@ void add_difference(const ComparedMeans& row, nlohmann::ordered_json& object);
 // Adds the keys resamples, confidence and seed.
 void add_bootstrap(const filters::BootstrapOptions& options, nlohmann::ordered_json& document);
 
-// The table's last columns: before, after, difference, interval, change % and finding.
+// Returns the titles of a table's last columns: before, after, difference, interval, change % and finding.
 std::vector<std::string> difference_titles(const filters::BootstrapOptions& options);
 std::vector<std::string> difference_cells(const ComparedMeans& row);
 

@@ -26,7 +26,7 @@ struct LoadedDataset {
   std::vector<SampleRecord> records;
 };
 
-// Every n-th record, so that a quick look sees the whole file.
+// Returns every n-th record, so that a quick run covers the whole file.
 std::vector<SampleRecord> evenly_spaced(std::vector<SampleRecord> records, std::int64_t limit) {
   const auto wanted = static_cast<std::size_t>(limit);
   if (limit <= 0 || wanted >= records.size()) return records;
@@ -38,7 +38,7 @@ std::vector<SampleRecord> evenly_spaced(std::vector<SampleRecord> records, std::
 LoadedDataset load(const EvaluatedDataset& dataset, std::int64_t limit) {
   const config::DatasetConfig& source = dataset.source;
   LoadedDataset loaded;
-  manifests::DigestCache digests{{}};  // remembers nothing: an evaluation leaves no files but its own
+  manifests::DigestCache digests{{}};  // has no file: an evaluation writes only its own results
   auto [read, annotations_sha256] = candidates::read_dataset(source, digests);
   loaded.result.name = source.name + "/" + source.split;
   loaded.result.annotations_sha256 = std::move(annotations_sha256);
@@ -87,7 +87,7 @@ Evaluation evaluate(const EvaluationConfig& config, const EvaluationOptions& opt
 
   std::unique_ptr<device::Network> network;
   std::unique_ptr<device::BodyMeshes> meshes;
-  device::DeviceWorker device;  // ends before what it works on
+  device::DeviceWorker device;  // destroyed before the objects that its jobs use
   device.run([&] {
     network = network::load_network(config.network, config.tta, config.priors);
     meshes = network::load_body_meshes(config.network.smal_asset);

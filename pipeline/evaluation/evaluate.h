@@ -1,4 +1,4 @@
-// `evaluate`: the paper's metrics of a network on test sets.
+// `evaluate`: measures the paper's metrics of a network on test sets.
 #pragma once
 
 #include <cstdint>
@@ -16,9 +16,9 @@ namespace q3d::pipeline::evaluation {
 struct EvaluationOptions {
   SettingOptions settings;
   std::int64_t limit = 0;       // samples of each dataset, evenly spaced; 0 = all
-  std::uint64_t seed = 0;       // of hidden keypoints and of k-means
+  std::uint64_t seed = 0;       // seed of hidden keypoints and of k-means
   bool official_means = false;  // a sample without a value counts as 0
-  int threads = 0;              // that read and decode; 0 = all cores; never changes a byte
+  int threads = 0;              // threads that read and decode; 0 = all cores; never changes a byte
   bool quiet = false;           // no progress
 };
 
@@ -39,7 +39,7 @@ struct SampleResult {
 struct DatasetResult {
   std::string name;  // dataset/split
   std::string annotations_sha256;
-  std::string truth_sha256;  // of the hidden truth; empty when there is none
+  std::string truth_sha256;  // digest of the hidden truth; empty if there is none
   std::int64_t listed = 0;   // samples of the annotation file; `limit` may take fewer
   bool is_rendered = false;  // its pictures come from `sample`
   std::vector<std::string> notes;
@@ -52,7 +52,7 @@ struct Evaluation {
   std::string checkpoint;  // file name
   std::string checkpoint_sha256;
   std::string smal_asset_sha256;
-  std::string device_key;      // what of the device decides the bits
+  std::string device_key;      // the properties of the device that decide the bits
   std::string device;          // for people
   std::string device_warning;  // a GPU that is present but cannot be used, and why; else empty
   std::vector<Setting> settings;
@@ -60,7 +60,7 @@ struct Evaluation {
   double seconds = 0.0;
 };
 
-// Predicts and, where asked to, adapts every sample in batches. A bad sample is a result with a reason.
+// Predicts and, if requested, adapts every sample in batches. A bad sample gives a result with a reason.
 // Throws ConfigError, std::runtime_error, Interrupted.
 Evaluation evaluate(const EvaluationConfig& config, const EvaluationOptions& options);
 

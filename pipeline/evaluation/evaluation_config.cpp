@@ -25,7 +25,7 @@ void resolve_paths(json& config, const fs::path& folder) {
   }
 }
 
-// Takes key out of the object, which may be anything, and returns its text; empty when it is not there.
+// Removes a key from `object`, which may be any JSON value, and returns its text; empty if it is absent.
 fs::path take_path(json& object, const char* key, const std::string& where) {
   if (!object.is_object() || !object.contains(key)) return {};
   if (!object[key].is_string()) {

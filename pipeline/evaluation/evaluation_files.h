@@ -1,4 +1,4 @@
-// Reads back what `evaluate` wrote: the values of every sample, for comparisons.
+// Reads the results that `evaluate` wrote, with the values of every sample, for comparisons.
 #pragma once
 
 #include <filesystem>
@@ -31,8 +31,8 @@ struct StoredEvaluation {
   std::map<std::string, StoredDataset> datasets;
 };
 
-// `path`: the folder that `evaluate` wrote, or its evaluation.json. Throws std::runtime_error naming file,
-// place, got and expected.
+// `path` is the folder that `evaluate` wrote, or its evaluation.json. Throws std::runtime_error that names
+// file and place, what was found and what was expected.
 StoredEvaluation read_evaluation(const std::filesystem::path& path);
 
 }  // namespace q3d::pipeline::evaluation

@@ -38,7 +38,7 @@ void append_numbers(const json& value, const std::string& where, std::vector<dou
   }
 }
 
-// Nested or flat: exactly `count` finite numbers.
+// Reads exactly `count` finite numbers, which may be nested or flat.
 std::vector<double> numbers(const json& object, const char* name, std::size_t count,
                             const std::string& where) {
   std::vector<double> values;

@@ -1,6 +1,6 @@
-// The hidden truth is all that is true of pictures whose annotation file says less. It is read for evaluation
-// alone, never for training. docs/synthetic-world.md describes the file, which the synthetic world writes
-// beside its 2D-only sets.
+// The hidden truth holds facts about pictures that their annotation file leaves out. It is read for
+// evaluation only, never for training. docs/synthetic-world.md describes the file, which the synthetic world
+// writes beside its 2D-only sets.
 #pragma once
 
 #include <cstddef>
@@ -24,16 +24,16 @@ struct PictureTruth {
 class HiddenTruth {
  public:
   // Reads one file: {"pictures": {<name as the annotation file lists it>: {...}}}. Mask paths are relative to
-  // `masks`; without that folder they are left out. Throws std::runtime_error naming file, picture, field,
-  // got and expected.
+  // `masks`; without that folder they are left out. Throws std::runtime_error that names file, picture and
+  // field, what was found and what was expected.
   HiddenTruth(const std::filesystem::path& file, const std::filesystem::path& masks);
 
   const PictureTruth* find(const std::string& listed_name) const;  // null when it is not there
   std::size_t size() const { return pictures_.size(); }
 
-  // Gives the records of these pictures their true body, species, family and mask. Returns how many records
-  // have no truth here. The file has one animal a picture: throws std::runtime_error when two records share
-  // one.
+  // Sets true body, species, family and mask of the records of these pictures. Returns how many records have
+  // no truth here. The file has one animal for each picture, so this throws std::runtime_error if two records
+  // share a picture.
   std::size_t complete(std::vector<manifests::SampleRecord>& records) const;
 
  private:

@@ -25,7 +25,8 @@ namespace fs = std::filesystem;
 using manifests::Reason;
 using manifests::Verdict;
 
-// One stage's tables. Opening a store would make its folder, so a folder that is gone is found first.
+// Reads the tables of one stage. It first checks that the folder exists, because opening a store would make
+// it.
 class StageTables {
  public:
   StageTables(const fs::path& out, const std::string& stage, const std::string& key)
@@ -54,10 +55,11 @@ class StageTables {
   stages::StageStore store_;
 };
 
-// The table may be of a later build over other pictures. Then its ids differ, or its L_proj.
+// Returns whether a table belongs to this candidate. A table of a later build over other pictures has other
+// ids or another L_proj.
 bool is_of(const dataset::VerdictRow& verdict, const manifests::SampleRecord& record,
            const unit::PredictedSample& predicted) {
-  constexpr double kRounding = 1e-6;  // another processor may round L_proj otherwise
+  constexpr double kRounding = 1e-6;  // another processor may round L_proj differently
   if (record.id != verdict.id) return false;
   const double stated = verdict.judgement.initial_error;
   if (std::isnan(stated)) return true;

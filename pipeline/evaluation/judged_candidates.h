@@ -1,5 +1,5 @@
-// Reads back from an output folder what a build made of its candidates: verdicts as published, the network's
-// predictions and the refined bodies. Neither annotation files nor pictures are read.
+// Reads the results of a build from its output folder: the published verdicts, the network's predictions and
+// the refined bodies. It reads neither annotation files nor pictures.
 #pragma once
 
 #include <filesystem>
@@ -21,22 +21,22 @@ struct JudgedCandidate {
   manifests::Verdict verdict = manifests::Verdict::failed;
   manifests::Reason reason = manifests::Reason::none;
   device::BodyPrediction predicted;               // before refinement
-  std::optional<device::BodyPrediction> refined;  // of the refined
+  std::optional<device::BodyPrediction> refined;  // set for refined candidates
 
-  // The body that went into the dataset; null when the candidate is not in it.
+  // Returns the body in the dataset, or null if the candidate is not in it.
   const device::BodyPrediction* label() const;
 };
 
 struct JudgedPool {
-  std::vector<JudgedCandidate> candidates;  // of role `pseudo` and with a prediction, in ingest order
-  std::int64_t failed = 0;                  // of role `pseudo`, without a prediction
+  std::vector<JudgedCandidate> candidates;  // candidates of role `pseudo` with a prediction, in ingest order
+  std::int64_t failed = 0;                  // candidates of role `pseudo` without a prediction
   std::string dataset;                      // name of the version folder
   std::string content_id;
 };
 
-// Reads the pool of the dataset that `config` has built in `out`. Throws ConfigError when the config has no
-// dataset of role `pseudo` or no thresholds, and std::runtime_error when its dataset has not been published
-// in `out`, when a stage's files are gone, or when they were made anew for other candidates or pictures.
+// Reads the pool of the dataset that was built with `config` in `out`. Throws ConfigError if the config has
+// no dataset of role `pseudo` or no thresholds, and std::runtime_error if its dataset has not been published
+// in `out`, or if a stage's files are gone or were replaced by those of other candidates or pictures.
 JudgedPool read_judged_pool(const config::BuildConfig& config, const std::filesystem::path& out);
 
 }  // namespace q3d::pipeline::evaluation

@@ -1,4 +1,4 @@
-// Reads back what `evaluate-labels --report` wrote.
+// Reads the results that `evaluate-labels --report` wrote.
 #pragma once
 
 #include <filesystem>
@@ -13,7 +13,7 @@ namespace q3d::pipeline::evaluation {
 struct StoredLabel {
   std::string id;
   bool kept = false;
-  MetricValues values;  // of the label, against the annotated keypoints and the true body; empty unless kept
+  MetricValues values;  // label against annotated keypoints and true body; empty unless kept
 };
 
 struct StoredLabels {

@@ -27,13 +27,13 @@ using manifests::Verdict;
 
 constexpr std::size_t kChunk = 64;  // candidates whose meshes are in memory together
 
-// The pool's records, completed by the truth files, with the true keypoints where a file has them.
+// The pool's records, completed by the truth files. They have the true keypoints if a file has them.
 struct Truths {
   std::vector<manifests::SampleRecord> records;
   std::vector<std::optional<manifests::Keypoints>> keypoints;
 };
 
-// Returns whether something is to be measured that only the annotation files know.
+// Returns whether the measurement needs facts that only the annotation files have.
 bool needs_annotations(const JudgedPool& pool, const Truths& truths) {
   for (std::size_t i = 0; i < truths.records.size(); ++i) {
     const manifests::SampleRecord& record = truths.records[i];
@@ -42,7 +42,7 @@ bool needs_annotations(const JudgedPool& pool, const Truths& truths) {
   return false;
 }
 
-// Fills in the bodies and masks of the annotation files where the truth files gave none.
+// Fills in bodies and masks from the annotation files where the truth files have none.
 void add_annotated(const config::BuildConfig& config, std::vector<manifests::SampleRecord>& records) {
   std::map<std::string, manifests::SampleRecord> annotated;  // by id
   for (const config::DatasetConfig& options : config.datasets) {
@@ -94,7 +94,7 @@ class LabelMeasurer {
   LabelMeasurer(const JudgedPool& pool, const Truths& truths, const device::BodyMeshes& meshes)
       : pool_(pool), truths_(truths), meshes_(meshes) {}
 
-  // Candidates [first, first + count).
+  // Measures the candidates [first, first + count).
   std::vector<MeasuredCandidate> measure_some(std::size_t first, std::size_t count) {
     std::vector<double> mask_areas(count, 0.0);
     tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {

@@ -1,4 +1,4 @@
-// `evaluate-labels`: how true are the labels that a build made? For pools whose truth is known.
+// `evaluate-labels`: measures the accuracy of the labels of a build, for pools whose truth is known.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -14,7 +14,7 @@
 
 namespace q3d::pipeline::evaluation {
 
-// A body of one candidate, measured.
+// The measurements of one body of a candidate.
 struct MeasuredBody {
   MetricValues annotated;  // 2D against the annotated keypoints, which adaptation saw; 3D against the truth
   MetricValues projected;  // 2D alone, against the true body's projections inside the picture, hidden or not
@@ -27,10 +27,10 @@ struct MeasuredCandidate {
   bool normalised_by_mask = false;
   bool has_truth = false;
   MeasuredBody predicted;             // before refinement
-  std::optional<MeasuredBody> label;  // of the kept
+  std::optional<MeasuredBody> label;  // set for kept candidates
 };
 
-// Candidates with one thing in common, by their label or by the prediction it came from.
+// A group of candidates, measured by their labels or by the predictions from which these came.
 struct LabelRow {
   std::string group;   // "pool", "kept", "retained", "refined", "discarded", and the discarded by reason
   std::string bodies;  // "label" or "prediction"
@@ -51,24 +51,24 @@ struct LabelEvaluation {
 };
 
 struct LabelOptions {
-  run::RunOptions run;                       // out: the output folder of the build
-  std::vector<std::filesystem::path> truth;  // hidden truth of the pool; none: the records' own
-  std::filesystem::path masks;               // folder that its mask paths start from; empty: not used
+  run::RunOptions run;                       // run.out is the output folder of the build
+  std::vector<std::filesystem::path> truth;  // hidden truth of the pool; if empty, the records' own
+  std::filesystem::path masks;               // base folder of its mask paths; if empty, masks are not used
 };
 
-// Judges the dataset that `config` has built in options.run.out. Reads it from that folder: no picture is
-// read, and annotation files only where the truth files lack a body or a mask. Throws ConfigError,
-// std::runtime_error, Interrupted.
+// Measures the dataset that was built with `config` in options.run.out. Everything is read from that folder.
+// No picture is read, and annotation files are read only if the truth files lack a body or a mask. Throws
+// ConfigError, std::runtime_error, Interrupted.
 LabelEvaluation evaluate_labels(const config::BuildConfig& config, const LabelOptions& options);
 
-// The rows of the groups that occur.
+// Returns the rows of the groups that occur.
 std::vector<LabelRow> group_labels(const std::vector<MeasuredCandidate>& candidates);
 
 nlohmann::ordered_json to_json(const LabelEvaluation& evaluation);
-std::string labels_csv(const LabelEvaluation& evaluation);  // a line a candidate
+std::string labels_csv(const LabelEvaluation& evaluation);  // one line for each candidate
 std::string summary_text(const LabelEvaluation& evaluation);
 
-// labels.csv and, last, labels.json; each whole or not at all. Throws std::runtime_error.
+// Writes labels.csv and, last, labels.json, each completely or not at all. Throws std::runtime_error.
 void write_label_evaluation(const std::filesystem::path& folder, const LabelEvaluation& evaluation);
 
 }  // namespace q3d::pipeline::evaluation

@@ -25,7 +25,7 @@ ordered_json means_json(const std::array<MetricMean, kMetricCount>& means, bool 
   return object;
 }
 
-// The 2D part of a row against one kind of keypoints, and the 3D part where `with_body`.
+// Returns a table with the 2D metrics against one kind of keypoints and, if `with_body`, the 3D metrics.
 std::string table_text(const std::vector<LabelRow>& rows,
                        std::array<MetricMean, kMetricCount> LabelRow::*means, bool with_body) {
   std::vector<std::string> header{"group", "bodies", "normaliser", "samples"};

@@ -37,13 +37,13 @@ inline std::size_t index_of(Metric metric) {
 
 struct MetricMean {
   std::optional<double> mean;
-  std::int64_t samples = 0;  // behind the mean
+  std::int64_t samples = 0;  // number of samples in the mean
 };
 // Returns the mean of one metric. A sample without a value is left out, or is 0 with `missing_is_zero`.
 MetricMean mean_of(std::span<const MetricValues* const> samples, std::size_t metric,
                    bool missing_is_zero = false);
 
-// The truth that a prediction is measured against.
+// The truth against which a prediction is measured.
 struct Target {
   device::CropKeypoints keypoints{};         // annotated
   double normaliser_px = smal::kCropSidePx;  // sqrt(mask area) of the 256-px crop, or 256 for the whole crop
@@ -52,14 +52,15 @@ struct Target {
   std::vector<float> vertices;  // V x 3, SMAL units; empty when the true mesh is not known
 };
 
-// The target that a record and its decoded picture give, but for the mesh.
+// Returns the target of a record and its decoded picture, without the mesh.
 Target make_target(const manifests::SampleRecord& record, double mask_area_px);
 
-// `mesh` is the predicted body's; it is needed when the target has vertices, and may be null otherwise.
+// Measures a body. `mesh` is that of the predicted body; it is needed if the target has vertices, and may be
+// null otherwise.
 MetricValues measure(const device::BodyPrediction& body, const device::BodyMesh* mesh, const Target& target);
 
-// The true bodies of the records that state pose and shape, for their targets' vertices; keypoints_3d are
-// filled from the body where the record lacks them. `records` and `targets` go together.
+// Poses the true bodies of the records that state pose and shape, and sets the vertices of their targets.
+// Also sets keypoints_3d if the record lacks them. targets[i] belongs to records[i].
 void add_true_meshes(std::span<const manifests::SampleRecord* const> records,
                      const device::BodyMeshes& meshes, std::span<Target> targets);
 

@@ -101,7 +101,7 @@ const std::vector<PaperTable>& tables_of_the_paper() {
   return kTables;
 }
 
-// The part of "name/split" before the slash; the paper's Quadruped2D is a part of SuperAnimal.
+// Returns the part of "name/split" before the slash. The paper's Quadruped2D is a part of SuperAnimal.
 std::string_view name_of(const std::string& dataset) {
   const std::string_view name = std::string_view(dataset).substr(0, dataset.find('/'));
   return name == "quadruped2d" ? std::string_view("superanimal") : name;

@@ -1,4 +1,4 @@
-// An evaluation in the layout of the paper's tables, with the paper's numbers beside it.
+// Shows an evaluation in the layout of the paper's tables, beside the paper's numbers.
 #pragma once
 
 #include <string>

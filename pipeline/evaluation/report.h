@@ -14,20 +14,21 @@ namespace q3d::pipeline::evaluation {
 inline constexpr const char* kEvaluationFormat = "quadruped3d-evaluation";
 inline constexpr int kEvaluationSchema = 1;
 
-// All tables, the config, digests, seed, and what was left out and why. No time, host or path of its own, so
-// equal evaluations give equal bytes.
+// Returns all tables, the config, digests, the seed, and the samples that were left out with the reasons. It
+// adds no time, host or path, so equal evaluations give equal bytes.
 nlohmann::ordered_json to_json(const Evaluation& evaluation, const Tables& tables);
 
-// One line a sample and setting; a sample that was left out has one line, with the reason and no values.
+// Returns one line for each sample and setting. A sample that was left out has one line, with the reason and
+// no values.
 std::string samples_csv(const Evaluation& evaluation);
 
-// All tables, one line a row.
+// Returns all tables, one line for each row.
 std::string tables_csv(const Tables& tables);
 
-// Tables aligned for a terminal. Species are many, so they are shown when asked for.
+// Returns the tables aligned for a terminal. There are many species, so they are shown only if requested.
 std::string summary_text(const Evaluation& evaluation, const Tables& tables, bool with_species);
 
-// Writes the three files, each whole or not at all, evaluation.json last. Throws std::runtime_error.
+// Writes the three files, each completely or not at all, evaluation.json last. Throws std::runtime_error.
 void write_evaluation(const std::filesystem::path& folder, const Evaluation& evaluation,
                       const Tables& tables);
 

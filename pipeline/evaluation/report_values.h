@@ -1,4 +1,4 @@
-// Values as reports show them.
+// Formats values as reports show them.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -9,7 +9,7 @@
 
 namespace q3d::pipeline::evaluation {
 
-// Shortest text that reads back as the same number; empty for nothing.
+// Returns the shortest text that reads back as the same number; empty for no value.
 std::string number_text(const std::optional<double>& value);
 nlohmann::ordered_json number_or_null(const std::optional<double>& value);
 

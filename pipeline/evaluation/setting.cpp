@@ -65,7 +65,7 @@ Plan plan_settings(const SettingOptions& options) {
 device::CropKeypoints hide_keypoints(const device::CropKeypoints& keypoints, double share, std::uint64_t seed,
                                      const std::string& sample_id) {
   const std::vector<std::size_t> visible = filters::shuffled_visible(keypoints, seed, sample_id);
-  // The tolerance keeps 0.7 * 10 at 7.
+  // The tolerance makes ceil(0.7 * 10) 7, not 8.
   const auto shown = static_cast<std::size_t>(std::ceil(share * static_cast<double>(visible.size()) - 1e-9));
   device::CropKeypoints result = keypoints;
   for (std::size_t i = shown; i < visible.size(); ++i) result[visible[i]].weight = 0.0F;

@@ -1,5 +1,5 @@
-// The settings under which the network is measured: its prediction as it is, and test-time adaptation of
-// several lengths and with fewer keypoints.
+// The settings under which the network is measured: its plain prediction, and test-time adaptation of several
+// lengths and with fewer keypoints.
 #pragma once
 
 #include <cstdint>
@@ -14,14 +14,14 @@ struct Setting {
   std::string name;  // "prediction", "TTA 30", "TTA 30 with 50 % of the keypoints", "iterate 20"
   bool uses_test_keypoints = false;
   int iterations = 0;          // adaptation steps at most
-  double visible_share = 1.0;  // of the visible keypoints that adaptation is given; metrics use all of them
+  double visible_share = 1.0;  // fraction of the visible keypoints that adaptation sees; metrics use all
 };
 
-// One adaptation of every sample: gives the kept iterate, or the iterates asked for.
+// One adaptation of every sample. It gives the kept iterate, or the requested iterates.
 struct TtaPass {
   int iterations = 0;
   double visible_share = 1.0;
-  std::vector<int> iterates;  // ascending; empty = the kept one, of least L_proj
+  std::vector<int> iterates;  // ascending; empty: the kept iterate, which has the least L_proj
 };
 
 struct SettingOptions {
@@ -31,15 +31,16 @@ struct SettingOptions {
 };
 
 struct Plan {
-  std::vector<Setting> settings;  // the prediction, then what the passes give, in order
+  std::vector<Setting> settings;  // the prediction, then the results of the passes in order
   std::vector<TtaPass> passes;
 };
 
 // Throws ConfigError on negative iterations, shares outside (0, 1], or shares without tta_iterations.
 Plan plan_settings(const SettingOptions& options);
 
-// `keypoints` with all but ceil(share * visible) of the visible ones hidden: a random choice by seed and
-// sample id, the same on every machine. Of one sample, a smaller share's choice is part of a larger one's.
+// Returns the keypoints with all but ceil(share * visible) of the visible ones hidden. The choice is random
+// by seed and sample id, and the same on every machine. For one sample, the choice of a smaller share is part
+// of that of a larger one.
 device::CropKeypoints hide_keypoints(const device::CropKeypoints& keypoints, double share, std::uint64_t seed,
                                      const std::string& sample_id);
 

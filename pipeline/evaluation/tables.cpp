@@ -38,7 +38,7 @@ class TableMaker {
       std::map<std::string, Samples> species;
       Samples unknown;
       for (const SampleResult* sample : all) {
-        // Family::none is the least enumerator; it goes last.
+        // Family::none is the first enumerator, but its row comes last.
         families[sample->family].push_back(sample);
         (sample->species.empty() ? unknown : species[sample->species]).push_back(sample);
       }

@@ -1,4 +1,5 @@
-// Means over samples: per dataset, family and species, and how well the predicted shapes cluster by family.
+// Computes means over samples for each dataset, family and species, and measures how well the predicted
+// shapes cluster by family.
 #pragma once
 
 #include <array>
@@ -17,7 +18,7 @@ struct TableRow {
   std::string dataset;  // name/split
   std::string group;    // a family or a species; empty in the table of datasets
   const Setting* setting = nullptr;
-  std::int64_t samples = 0;  // with a prediction
+  std::int64_t samples = 0;  // samples with a prediction
   std::int64_t by_mask = 0;  // of these, normalised by a mask; the others by the whole crop
   std::array<MetricMean, kMetricCount> metrics;
 };
@@ -27,8 +28,8 @@ struct ClusterRow {
   std::string dataset;
   const Setting* setting = nullptr;  // null: the true shapes
   std::int64_t samples = 0;
-  std::int64_t families = 0;  // that occur among them
-  std::optional<double> ari;  // nothing when there are fewer samples than clusters
+  std::int64_t families = 0;  // families that occur among these samples
+  std::optional<double> ari;  // nothing if there are fewer samples than clusters
 };
 
 struct Tables {
@@ -40,8 +41,8 @@ struct Tables {
 
 inline constexpr int kShapeClusters = 5;
 
-// Settings are referred to, so the evaluation must outlive the tables. With options.official_means a sample
-// without a value counts as 0, where its dataset has any value of that metric.
+// The tables point to the evaluation's settings, so it must outlive them. With options.official_means a
+// sample without a value counts as 0 if its dataset has any value of that metric.
 Tables make_tables(const Evaluation& evaluation);
 
 }  // namespace q3d::pipeline::evaluation

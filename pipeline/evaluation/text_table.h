@@ -1,4 +1,4 @@
-// A table for a terminal: columns as wide as their widest cell, numbers to the right.
+// A table for a terminal. Columns are as wide as their widest cell, and numbers are aligned to the right.
 #pragma once
 
 #include <optional>
@@ -9,7 +9,7 @@ namespace q3d::pipeline::evaluation {
 
 class TextTable {
  public:
-  // `text_columns`: the first so many columns are aligned to the left.
+  // The first `text_columns` columns are aligned to the left.
   TextTable(std::vector<std::string> header, std::size_t text_columns);
   void add(
       std::vector<std::string> row);  // throws std::logic_error on another number of cells than the header
@@ -21,7 +21,7 @@ class TextTable {
   std::size_t text_columns_;
 };
 
-// "-" for nothing.
+// Returns "-" for no value.
 std::string cell(const std::optional<double>& value, int decimals);
 
 }  // namespace q3d::pipeline::evaluation

@@ -16,8 +16,8 @@ constexpr std::array<std::pair<int, int>, 27> kBones{
      {18, 13}, {12, 13}, {12, 8},  {8, 14}, {14, 3}, {13, 9},  {9, 15}, {15, 4},  {12, 7},
      {13, 7},  {7, 10},  {10, 16}, {16, 5}, {7, 11}, {11, 17}, {17, 6}, {7, 25},  {25, 19}}};
 
-// COCO has 0 for a point that is not labelled, 1 for a hidden one and 2 for a visible one. A confidence says
-// nothing about hiding.
+// Returns COCO's v: 0 for a point that is not labelled, 1 for a hidden one and 2 for a visible one. A
+// confidence does not say whether a point is hidden.
 int coco_v(const manifests::Keypoint& keypoint) {
   if (!(keypoint.weight > 0.0F)) return 0;
   return keypoint.v == 1.0F ? 1 : 2;

@@ -1,4 +1,4 @@
-// COCO keypoints: annotations.json and images/, a picture for each sample.
+// Writes COCO keypoints: annotations.json and images/, with a picture for each sample.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -29,7 +29,7 @@ struct Point {
 using Points = std::array<Point, kKeypoints>;
 
 struct Picture {
-  std::string id;  // of the sample; in the export's own file
+  std::string id;  // id of the sample, from the export's own file
   loaders::pictures::Affine from_image{};
   std::vector<const json*> annotations;
 };
@@ -69,7 +69,7 @@ std::int64_t id_of(const CocoFile& file, const char* place, const json& id) {
   fail(file.path, fmt::format("{}: got {}, expected a whole number", place, id.dump()));
 }
 
-// Sample ids become lines of lists, whose parts are separated by tabs.
+// Reads a sample id. It must fit into a line of a list whose parts are separated by tabs.
 std::string sample_id_of(const CocoFile& file, const json& id) {
   auto text = id.get<std::string>();
   if (std::none_of(text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }))
@@ -77,7 +77,7 @@ std::string sample_id_of(const CocoFile& file, const json& id) {
   fail(file.path, fmt::format("images: quadruped3d: id: got {}, expected a text of one line", id.dump()));
 }
 
-// Throws as `fail` if it has no inverse.
+// Reads an affine map. Throws as `fail` does if it has no inverse.
 loaders::pictures::Affine affine_of(const CocoFile& file, const json& numbers) {
   const auto affine = numbers.get<loaders::pictures::Affine>();
   try {
@@ -113,7 +113,7 @@ void index_pictures(CocoFile& file) {
   }
 }
 
-// Fills `file`, to which the index points.
+// Fills `file`. The index holds pointers into it, so it must not move.
 void read_coco(const fs::path& path, CocoFile& file) {
   file.path = path;
   file.document = manifests::read_json_file(path);
@@ -156,7 +156,8 @@ bool has_changed(const Point& before, const Point& after) {
          (std::abs(before.x - after.x) > kUnmovedPx || std::abs(before.y - after.y) > kUnmovedPx);
 }
 
-// Throws std::out_of_range if a point lies nowhere in the source picture's plane.
+// Returns the points that changed. Throws std::out_of_range if a point has no finite position in the source
+// picture.
 std::vector<candidates::CorrectedPoint> changed_points(const Points& before, const Points& after,
                                                        const loaders::pictures::Affine& image_from_picture) {
   std::vector<candidates::CorrectedPoint> changed;

@@ -13,17 +13,17 @@ namespace q3d::pipeline::exports {
 
 struct CocoChanges {
   std::map<std::string, std::vector<candidates::CorrectedPoint>> points;  // by sample id
-  std::map<std::string, std::string> vetoes;                              // sample id -> why
-  std::size_t pictures = 0;                                               // that both files list
+  std::map<std::string, std::string> vetoes;                              // sample id -> reason
+  std::size_t pictures = 0;                                               // pictures that both files list
 };
 
 // Compares annotations.json of an exported folder with the file that came back from an annotation tool.
 //
 // Pictures are matched by their file names without folders, because tools give their own ids. A picture that
-// the file does not list is left as it was. One that it lists without an annotation is vetoed, and so is one
-// whose annotation has the attribute "veto": true. Keypoints are matched by their names; one counts as
-// changed if it moved by more than 0.01 px, to which tools round, or if its v differs. Points come in px of
-// the source picture.
+// the file does not list is unchanged. One that it lists without an annotation is vetoed, and so is one whose
+// annotation has the attribute "veto": true. Keypoints are matched by their names; one counts as changed if
+// it moved by more than 0.01 px, because tools round to that, or if its v differs. Points come in px of the
+// source picture.
 //
 // Throws std::runtime_error that names the file, what was found and what was expected: for files that cannot
 // be read, a picture that the export lacks or that has several annotations, and keypoints of other names.

@@ -13,7 +13,7 @@ constexpr const char* kPaper =
     "Xiaohang Yu, Ti Wang and Mackenzie Weygandt Mathis: PRIMA: Boosting Animal Mesh Recovery with "
     "Biological Priors and Test-Time Adaptation. arXiv:2606.02366, 2026.";
 
-// The @context of the specification.
+// Returns the @context of the specification.
 ordered_json context() {
   ordered_json context = {{"@language", "en"}, {"@vocab", "https://schema.org/"}};
   for (const char* term : {"arrayShape", "citeAs",   "column",      "containedIn",   "equivalentProperty",

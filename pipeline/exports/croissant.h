@@ -1,4 +1,4 @@
-// Croissant 1.1 metadata of an export in JSON files and pictures.
+// Writes the Croissant 1.1 metadata of an export that consists of JSON files and pictures.
 #pragma once
 
 #include <string>
@@ -35,7 +35,7 @@ struct CroissantDataset {
   std::vector<std::string> picture_patterns;  // "images/*.jpg"; none without pictures
 };
 
-// The text of croissant.json.
+// Returns the text of croissant.json.
 std::string croissant_text(const CroissantDataset& dataset);
 
 }  // namespace q3d::pipeline::exports

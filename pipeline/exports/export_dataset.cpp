@@ -164,7 +164,7 @@ class Exporter {
     return result;
   }
 
-  // The official code, which is given the box alone, must cut the very crop that the label refers to.
+  // Checks that the official code, which gets only the box, cuts exactly the crop to which the label refers.
   static void check_crop(const ShardSample& sample, const ExportedPicture& picture) {
     const auto square = loaders::pictures::square_box(exported_box(sample, picture));
     const auto centre =
@@ -181,7 +181,7 @@ class Exporter {
         sample.record.id, square.center_x_px, square.center_y_px, square.side_px, centre.x, centre.y, side));
   }
 
-  // Says how many of all samples have a picture, and which datasets lack a licence.
+  // Returns how many of the samples have a picture, and the datasets without a licence.
   ordered_json summary_json() const {
     std::int64_t pictures = 0;
     std::set<std::string> without;

@@ -1,4 +1,4 @@
-// `export`: a finished dataset in another project's format.
+// `export`: writes a finished dataset in another project's format.
 #pragma once
 
 #include <cstdint>
@@ -13,8 +13,8 @@ enum class Format { prima, coco };
 struct ExportOptions {
   Format format = Format::prima;
   std::filesystem::path out;
-  bool pictures_anyway = false;  // also pictures of datasets that state no licence
-  int threads = 0;               // that make pictures; 0 = all cores. Changes no byte
+  bool pictures_anyway = false;  // export pictures also of datasets that state no licence
+  int threads = 0;               // threads that make pictures; 0 = all cores. Changes no byte
   bool quiet = false;
 };
 
@@ -26,11 +26,11 @@ struct ExportSummary {
   bool was_complete = false;                 // an earlier run had finished it
 };
 
-// Writes the newest or the given version of a dataset into options.out. docs/export.md describes the files.
-// A run that was stopped goes on with the units that are missing; the bytes do not depend on it.
+// Writes the newest or the given version of a dataset into options.out. docs/export.md describes the files. A
+// new run after a stopped one makes only the missing units; the bytes are the same.
 //
-// Samples of a dataset without a stated licence, and of shards without pictures, keep the frame of the
-// source's own picture, which they name.
+// Samples of a dataset without a stated licence, and of shards without pictures, keep the pixel coordinates
+// of the source's own picture and name that picture.
 //
 // Throws std::runtime_error for a dataset that cannot be read, run::ConfigError if the folder holds something
 // else, and Interrupted.

@@ -35,7 +35,7 @@ ordered_json read_json(const fs::path& file) {
   }
 }
 
-// {"NAME": [BYTES, "SHA-256"], ...} in one line: what a part says of its pictures.
+// Returns the pictures of a part as one line: {"NAME": [BYTES, "SHA-256"], ...}.
 std::string line_of(const ExportFolder::Files& pictures) {
   ordered_json line = ordered_json::object();
   for (const auto& [name, file] : pictures) line[name] = {file.bytes, file.sha256};
@@ -50,7 +50,8 @@ ordered_json list_of(const ExportFolder::Files& files) {
   return list;
 }
 
-// The manifest may be a stranger's. Throws json::exception if it has another form.
+// Checks the files that a manifest lists. A stranger may have written the manifest. Throws json::exception if
+// it has another form.
 void check_files(const fs::path& out, const ordered_json& list, const fs::path& manifest) {
   if (!list.is_array()) {
     throw std::runtime_error(fmt::format("{}: got {}, expected a list of files; remove {} and export again",
@@ -85,7 +86,7 @@ ExportFolder::ExportFolder(fs::path out, ordered_json about)
     : out_(std::move(out)), parts_(out_ / ".parts"), about_(std::move(about)) {
   complete_ = open_complete();
   if (complete_) {
-    drop_parts();  // the run that completed the export was killed before it came to that
+    drop_parts();  // the run that completed the export was killed before this step
   } else {
     open_parts();
   }
@@ -198,7 +199,7 @@ void ExportFolder::finish(const ordered_json& summary) {
   complete_ = true;
 }
 
-// A power cut after this must not bring them back.
+// Removes the parts durably, so that a power cut cannot bring them back.
 void ExportFolder::drop_parts() {
   if (fs::remove_all(parts_) > 0) manifests::sync_folder(out_);
 }

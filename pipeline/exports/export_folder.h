@@ -1,4 +1,5 @@
-// The folder that an export fills: whole files alone, resumable, with a manifest written last.
+// The folder that an export fills. It holds only complete files, an export can be resumed, and the manifest
+// is written last.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -27,20 +28,20 @@ class ExportFolder {
   };
   using Files = std::map<std::string, File>;  // by their names in the folder
 
-  // `about` says what is exported and how; equal exports have equal words there. Throws run::ConfigError if
-  // the folder holds another export or other files, and std::runtime_error if another export writes there or
-  // a file of a complete export, pictures included, is gone or damaged.
+  // `about` says what is exported and how; equal exports must have an equal `about`. Throws run::ConfigError
+  // if the folder holds another export or other files, and std::runtime_error if another export writes there
+  // or a file of a complete export, pictures included, is gone or damaged.
   ExportFolder(std::filesystem::path out, nlohmann::ordered_json about);
 
   const std::filesystem::path& path() const { return out_; }
   bool is_complete() const { return complete_; }
-  // export.json of a complete export.
+  // Returns the content of export.json of a complete export.
   const nlohmann::ordered_json& manifest() const { return manifest_; }
 
   // Writes a picture or mask. The unit's part lists it, and through it the manifest. Thread-safe.
   File write_picture(const std::string& name, std::span<const std::byte> content) const;
-  // The records of a unit and the pictures that they name. A part with another input digest, or with damaged
-  // bytes, does not count.
+  // Returns whether the unit has a part, which holds its records and lists their pictures. A part with
+  // another input digest, or with damaged bytes, does not count.
   bool has_part(std::int64_t unit, const std::string& input_digest);
   void save_part(std::int64_t unit, const std::string& input_digest, std::int64_t rows, std::string_view text,
                  const Files& pictures);

@@ -1,5 +1,5 @@
-// A format of an export differs from others in the names of pictures, the records, and the files made of
-// them.
+// The interface of an export format, which defines the names of pictures, the records, and the files that are
+// made from them.
 #pragma once
 
 #include <cstdint>
@@ -29,19 +29,19 @@ struct PictureFile {
   const std::vector<std::byte>* bytes = nullptr;
 };
 
-// Thread-safe, but for assemble().
+// All functions but assemble() are thread-safe.
 class FormatWriter {
  public:
   virtual ~FormatWriter() = default;
   // Returns the kind of picture that the format needs, where pictures may be exported.
   virtual Pictures pictures() const = 0;
-  // The files of the sample's picture; none where it has none.
+  // Returns the files of the sample's picture, or nothing if it has no picture.
   virtual std::vector<PictureFile> picture_files(const ExportedSample& exported) const = 0;
-  // The sample's part of the unit's records: lines, each with its line feed.
+  // Returns the sample's part of the unit's records, as lines that end in line feeds.
   virtual std::string lines(const ExportedSample& exported) const = 0;
   // Takes the records of the next unit; units come in order.
   virtual void take(const std::string& lines) = 0;
-  // Writes the annotation files. Returns what croissant.json is to say of them.
+  // Writes the annotation files. Returns their description for croissant.json.
   virtual std::vector<CroissantRecords> assemble(ExportFolder& folder) = 0;
   virtual std::vector<std::string> picture_patterns() const = 0;
 };

@@ -70,8 +70,8 @@ manifests::Box exported_box(const manifests::ShardSample& sample, const Exported
   const double factor = picture.from_image[0];
   const pictures::Point corner = pictures::map_point(picture.from_image, {box.x_px, box.y_px});
   manifests::Box mapped{corner.x, corner.y, box.w_px * factor, box.h_px * factor};
-  // Rounding may put a centre that lies on a whole pixel just below it, and flooring then takes the pixel
-  // before.
+  // Rounding may move a centre that lies on a whole pixel to just below it, and flooring would then take the
+  // previous pixel.
   const pictures::Point centre =
       pictures::map_point(picture.from_image, {sample.patch_box[0], sample.patch_box[1]});
   const auto reach = [](double& start, double extent, double whole) {

@@ -1,4 +1,4 @@
-// The picture of a sample as an export writes it, and where the sample's numbers lie in it.
+// The picture of a sample as an export writes it, with the sample's box and keypoints in its pixels.
 #pragma once
 
 #include <cstddef>
@@ -27,7 +27,7 @@ struct ExportedPicture {
   loaders::pictures::Affine from_image{};
 };
 
-// The picture of a sample from a shard of this image encoding.
+// Returns the picture of a sample from a shard of this image encoding.
 //
 // A crop that was reduced when it was stored has the centre of the network's crop between two pixels. For the
 // official code, which floors that centre, such a crop is shifted by less than a pixel with OpenCV's Lanczos
@@ -37,11 +37,12 @@ struct ExportedPicture {
 ExportedPicture export_picture(const manifests::ShardSample& sample, manifests::ImageEncoding image_encoding,
                                Pictures pictures);
 
-// The sample's box in the exported picture. square_box() of it is the network's crop in that picture.
+// Returns the sample's box in the exported picture. Its square_box() is the network's crop in that picture.
 manifests::Box exported_box(const manifests::ShardSample& sample, const ExportedPicture& picture);
 
-// File name of the sample's picture without its suffix: "red+fox_000002_000117", of species, unit and row.
-// The species can be read from it (loaders/species); "animal" stands for an unknown one.
+// Returns the file name of the sample's picture without its suffix, made of species, unit and row:
+// "red+fox_000002_000117". The species can be read from it (loaders/species); "animal" stands for an unknown
+// one.
 std::string picture_stem(const manifests::ShardSample& sample, std::int64_t unit, std::int64_t row);
 
 }  // namespace q3d::pipeline::exports

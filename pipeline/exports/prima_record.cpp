@@ -24,7 +24,8 @@ ordered_json rows(std::span<const float> values, std::size_t width) {
   return list;
 }
 
-// A body of the annotation file keeps the file's own numbers, which matrices give back up to rounding only.
+// Returns the pose. A body of the annotation file keeps the file's own numbers, because a conversion from
+// matrices would round them.
 ordered_json pose_of(const manifests::ShardSample& sample) {
   if (sample.label_kind == manifests::LabelKind::truth) {
     return numbers(sample.record.truth.value().pose_axis_angle);

@@ -1,4 +1,5 @@
-// The folder that PRIMA's and AniMer's training reads: <dataset>/<split>.json with its pictures and masks.
+// Writes the folder that PRIMA's and AniMer's training reads: <dataset>/<split>.json with its pictures and
+// masks.
 #include <fmt/format.h>
 
 #include <map>
@@ -12,8 +13,8 @@
 namespace q3d::pipeline::exports {
 namespace {
 
-// The official code opens a mask for every picture. If no pixel of it reaches one half, it takes the whole
-// crop, as it should for a sample without a mask.
+// Returns a black mask for samples without one, because the official code opens a mask for every picture. If
+// no pixel of the mask reaches one half, it uses the whole crop, as it should here.
 std::string blank_mask(int side_px) {
   return fmt::format("masks/none_{}.png", side_px);
 }

@@ -28,7 +28,7 @@ DrawSequence::DrawSequence(const std::vector<PoolShare>& pools, std::uint64_t se
 Draw DrawSequence::at(std::int64_t position) const {
   manifests::Rng random(seed_, {static_cast<std::uint64_t>(position)});
   const double point = random.uniform();
-  // The first pool whose part ends above the point; pools without weight have no part.
+  // Find the first pool whose part ends above the point. A pool without weight has no part.
   const auto end = std::upper_bound(cumulative_.begin(), cumulative_.end(), point);
   Draw draw;
   draw.pool = static_cast<std::size_t>(end - cumulative_.begin());

@@ -9,7 +9,7 @@ namespace q3d::pipeline::feed {
 
 struct PoolShare {
   std::int64_t samples = 0;
-  double weight = 1.0;  // of each sample, as in the official WeightedRandomSampler
+  double weight = 1.0;  // weight of each sample, as in the official WeightedRandomSampler
 };
 
 struct Draw {
@@ -18,7 +18,8 @@ struct Draw {
   std::uint64_t seed = 0;   // for the sample's augmentation
 };
 
-// Each draw depends on seed and position only, so a run resumes at any position and threads never matter.
+// Each draw depends on seed and position only, so a run can resume at any position, and the number of threads
+// does not matter.
 class DrawSequence {
  public:
   // Throws std::invalid_argument when nothing can be drawn or a weight is not a finite number >= 0.

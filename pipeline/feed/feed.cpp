@@ -38,7 +38,7 @@ std::vector<std::string> all_species(const std::vector<ShardPool>& pools) {
   return {names.begin(), names.end()};
 }
 
-// Index in the sorted list, -1 for a name that it lacks.
+// Returns the index in the sorted list, or -1 for a name that it lacks.
 std::int64_t number_of(const std::string& name, const std::vector<std::string>& names) {
   const auto found = std::lower_bound(names.begin(), names.end(), name);
   return found != names.end() && *found == name ? found - names.begin() : -1;
@@ -209,7 +209,8 @@ FeedStream::FeedStream(const Feed& feed, std::int64_t first_draw, int ahead)
     : feed_(feed), next_draw_(first_draw), ahead_(static_cast<std::size_t>(std::max(0, ahead))) {}
 
 FeedBatch FeedStream::next() {
-  // One more than `ahead`, the batch that is asked for included; that one runs here when nothing runs ahead.
+  // Keep `ahead` batches and the requested one in preparation. The requested one is computed here if `ahead`
+  // is 0.
   while (prepared_.size() <= ahead_) {
     const auto policy = ahead_ == 0 ? std::launch::deferred : std::launch::async;
     prepared_.push_back(

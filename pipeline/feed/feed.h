@@ -26,9 +26,9 @@ struct FeedOptions {
   bool augment = true;
   loaders::pictures::AugmentOptions augmentation{};
   KeypointWeight keypoint_weight = KeypointWeight::label;
-  int threads = 0;  // that decode and warp; 0 = all cores. Changes no bit
-  // With several ranks, each takes its contiguous part of every batch, so that together they see what one
-  // would.
+  int threads = 0;  // threads that decode and warp; 0 = all cores. Changes no bit
+  // With several ranks, each takes its contiguous part of every batch, so that together they see the same
+  // batches as a single rank.
   int rank = 0;
   int ranks = 1;
 };
@@ -47,19 +47,20 @@ struct FeedBatch {
   std::vector<std::int64_t> species;       // (B), index into Feed::species(), -1 for unknown
 };
 
-// Thread-safe. A batch depends on pools, options but the threads, seed and position alone.
+// Thread-safe. A batch depends only on pools, options (without the threads), seed and position.
 class Feed {
  public:
-  // `weights`: one a pool. Throws std::invalid_argument, also when the ranks cannot have equal parts.
+  // `weights` has one number for each pool. Throws std::invalid_argument, also if the ranks cannot have equal
+  // parts.
   Feed(std::vector<ShardPool> pools, const std::vector<double>& weights, const FeedOptions& options,
        std::uint64_t seed);
 
-  // This rank's part of the draws [first_draw, first_draw + options.batch). Throws std::runtime_error naming
-  // the sample when its picture cannot be decoded.
+  // Returns this rank's part of the draws [first_draw, first_draw + options.batch). Throws std::runtime_error
+  // that names the sample if its picture cannot be decoded.
   FeedBatch batch(std::int64_t first_draw) const;
-  // The samples of a joint batch, for messages.
+  // Returns the ids of the samples of a joint batch, for messages.
   std::vector<std::string> ids(std::int64_t first_draw) const;
-  // The pools' species by name.
+  // Returns the pools' species, sorted by name.
   const std::vector<std::string>& species() const { return species_; }
   std::int64_t batch_size() const { return options_.batch; }  // of all ranks together
 
@@ -75,7 +76,7 @@ class Feed {
   std::unique_ptr<tbb::task_arena> arena_;
 };
 
-// Consecutive batches, `ahead` of them prepared in the background. The feed must outlive it.
+// Gives consecutive batches, and prepares `ahead` of them in the background. The feed must outlive it.
 class FeedStream {
  public:
   FeedStream(const Feed& feed, std::int64_t first_draw, int ahead);

@@ -1,4 +1,4 @@
-// Memory for the pictures of training batches, which is used again once a batch is gone.
+// Provides memory for the pictures of training batches. It is reused when a batch is destroyed.
 #pragma once
 
 #include <cstddef>
@@ -9,14 +9,14 @@
 
 namespace q3d::pipeline::feed {
 
-// A batch of 48 pictures is 38 MB. Fresh memory of that size comes from the system, which clears every page;
-// that took a third of the feed's time.
+// A batch of 48 pictures is 38 MB. New memory of that size comes from the system, which clears every page;
+// this would take a third of the feed's time.
 //
 // Thread-safe. A buffer may outlive this object.
 class ImageBuffers {
   struct Unused {
     std::mutex mutex;
-    std::vector<std::unique_ptr<float[]>> buffers;  // has room for all that were ever made
+    std::vector<std::unique_ptr<float[]>> buffers;  // has room for all buffers that were ever made
     std::size_t made = 0;
   };
   class GiveBack {
@@ -32,10 +32,10 @@ class ImageBuffers {
  public:
   using Buffer = std::unique_ptr<float[], GiveBack>;
 
-  // All buffers hold this many numbers.
+  // Every buffer holds this many numbers.
   explicit ImageBuffers(std::size_t numbers) : numbers_(numbers) {}
 
-  // The numbers are arbitrary.
+  // Returns a buffer with arbitrary numbers.
   Buffer take() const;
 
  private:

@@ -23,15 +23,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// No picture that can be decoded is as wide as the largest box (200 million pixels are the limit for a
-// picture).
+// The largest box is wider than any picture that can be decoded (a picture has at most 200 million pixels).
 constexpr double kSmallestSidePx = 1e-3;
 constexpr double kLargestSidePx = 1e7;
 
 // The digests of shards that the dataset.json files state. Each file is read once.
 class Listings {
  public:
-  // Nothing if there is no dataset.
+  // Returns nothing if there is no dataset.
   const std::map<std::string, std::string>* of(const fs::path& dataset) {
     if (dataset.empty()) return nullptr;
     auto found = listings_.find(dataset);
@@ -40,7 +39,7 @@ class Listings {
   }
 
  private:
-  using Listing = std::map<std::string, std::string>;  // digests by the file's name
+  using Listing = std::map<std::string, std::string>;  // digests by file name
   static std::optional<Listing> read(const fs::path& file) {
     if (!fs::exists(file)) return std::nullopt;
     Listing listing;
@@ -53,7 +52,8 @@ class Listings {
   std::map<fs::path, std::optional<Listing>> listings_;
 };
 
-// The folder of the dataset to which a shard belongs, as far as its place says; empty if it belongs to none.
+// Returns the folder of the dataset to which a shard belongs, judging by its path; empty if it belongs to
+// none.
 fs::path dataset_of(const fs::path& shard) {
   const fs::path folder = fs::absolute(shard).parent_path();
   return folder.filename() == "shards" ? folder.parent_path() : fs::path();
@@ -68,7 +68,7 @@ std::string problem_of(const fs::path& file, const std::string& sha256,
   return fmt::format("its SHA-256 is {}, dataset.json says {}", sha256, listed->second);
 }
 
-// The shards that are listed and not there.
+// Adds the shards that are listed but do not exist.
 void add_missing(const fs::path& dataset, const std::map<std::string, std::string>& listing,
                  std::vector<CheckedShard>& shards) {
   for (const auto& [name, digest] : listing) {
@@ -142,7 +142,7 @@ std::vector<DamagedRecord> find_damaged_records(const ShardPool& pool, bool deco
     try {
       problem = problem_of(pool.sample(position), decode);
     } catch (const manifests::IoError& error) {
-      if (error.code() != 0) throw;  // the disk failed, which says nothing of the record
+      if (error.code() != 0) throw;  // a failure of the disk, not of the record
       problem = error.what();
     } catch (const std::runtime_error& error) {
       problem = error.what();

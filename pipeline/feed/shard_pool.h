@@ -1,4 +1,4 @@
-// The samples of many shards under one running number.
+// Numbers the samples of many shards consecutively.
 #pragma once
 
 #include <array>
@@ -31,26 +31,26 @@ struct TrainingSample {
   smal::Keypoints3d keypoints_3d{};
 };
 
-// The shards of a pool's sources, in the order of their samples. Each source is a shard, or a folder whose
-// *.h5 files, or those of its subfolder "shards", are taken in the order of their names. Throws
-// std::runtime_error naming the path when a source holds no shard.
+// Returns the shards of a pool's sources, in the order of their samples. A source is a shard, or a folder
+// whose *.h5 files, or those of its subfolder "shards", are taken in the order of their names. Throws
+// std::runtime_error that names the path if a source holds no shard.
 std::vector<std::filesystem::path> shard_files(const std::vector<std::filesystem::path>& sources);
 
 // Reads take no lock and may run in many threads.
 class ShardPool {
  public:
-  // Opens shard_files(sources). Throws std::runtime_error naming the path when a shard is not sound or only
-  // refers to pictures, and like shard_files.
+  // Opens shard_files(sources). Throws std::runtime_error that names the path if a shard is damaged or only
+  // refers to pictures, and as shard_files does.
   ShardPool(std::string name, const std::vector<std::filesystem::path>& sources);
 
-  // Takes samples out of the pool: those at these positions, which count as before the call. The later ones
-  // move up. Throws std::out_of_range.
+  // Removes the samples at these positions, which refer to the pool before the call. Later samples move up.
+  // Throws std::out_of_range.
   void leave_out(const std::vector<std::int64_t>& positions);
 
   const std::string& name() const { return name_; }
   std::int64_t size() const { return static_cast<std::int64_t>(places_.size()); }
-  // Throw std::out_of_range for a sample that the pool lacks and std::runtime_error when a shard cannot be
-  // read.
+  // These throw std::out_of_range for a sample that the pool lacks and std::runtime_error if a shard cannot
+  // be read.
   TrainingSample sample(std::int64_t index) const;
   std::string id(std::int64_t index) const;
   std::set<std::string> species() const;  // all names but the empty one
@@ -68,7 +68,7 @@ class ShardPool {
   };
   std::string name_;
   std::vector<manifests::ShardReader> shards_;
-  std::vector<ShardAndRow> places_;  // of every sample
+  std::vector<ShardAndRow> places_;  // shard and row of every sample
 };
 
 }  // namespace q3d::pipeline::feed

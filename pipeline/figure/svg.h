@@ -1,4 +1,4 @@
-// The elements of the SVG figures that this program draws, and text that is safe in SVG and HTML.
+// Writes the elements of SVG figures, and escapes text for SVG and HTML.
 #pragma once
 
 #include <span>
@@ -7,7 +7,8 @@
 
 namespace q3d::pipeline::figure {
 
-// The text with &, <, > and quotation marks written so that a browser shows them instead of obeying them.
+// Returns the text with &, <, > and quotation marks escaped, so that a browser shows them and does not
+// interpret them.
 std::string escaped(std::string_view text);
 
 struct Place {
@@ -27,7 +28,7 @@ class Svg {
   void append(const Svg& other) { elements_ += other.elements_; }
   bool is_empty() const { return elements_.empty(); }
 
-  // The whole document, white behind its elements.
+  // Returns the whole document on a white background.
   std::string document(double width_px, double height_px) const;
 
  private:

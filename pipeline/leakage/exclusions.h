@@ -10,9 +10,10 @@
 
 namespace q3d::pipeline::leakage {
 
-// Marks them, tells of them in the notes, and renews the label digests of their units. Of leaks only those of
-// role `pseudo` are marked; the others are told. `out` keeps the pictures' hashes and gets the lists of what
-// was found (pipeline/leakage/leakage_lists.h). Throws ConfigError, std::runtime_error, Interrupted.
+// Marks these candidates, mentions them in the notes, and updates the label digests of their units. Leaked
+// candidates are marked only if their role is `pseudo`; the others are only noted. `out` keeps the pictures'
+// hashes and gets the lists of what was found (pipeline/leakage/leakage_lists.h). Throws ConfigError,
+// std::runtime_error, Interrupted.
 void leave_out(const config::BuildConfig& config, manifests::DigestCache& digests,
                const std::filesystem::path& out, bool quiet, candidates::Ingest& ingest);
 

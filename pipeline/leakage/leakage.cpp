@@ -38,7 +38,8 @@ struct Pictures {
   std::unordered_map<std::string, std::size_t> of_sha256;
   std::unordered_set<std::string> other_paths;
 
-  // Returns its place. The first sample of a picture gives its id, and a later one an origin it lacks.
+  // Adds a sample and returns the position of its picture. The first sample of a picture gives the id; a
+  // later one may give the origin if it is missing.
   std::size_t add(std::size_t sample, const SampleRecord& record, const std::string& sha256) {
     const auto [found, is_new] = of_sha256.emplace(sha256, list.size());
     if (is_new) list.push_back({sample, record.id, record.image_path, sha256, record.orientation, {}, {}});
@@ -57,7 +58,8 @@ struct Pictures {
   }
 };
 
-// A record that failed for another reason than its picture still shows which picture a test set holds.
+// Reads the test sets. A record that failed for a reason other than its picture still shows that the test set
+// holds this picture.
 Pictures read_test_sets(const config::LeakageConfig& config, manifests::DigestCache& digests,
                         LeakageReport& report) {
   Pictures pictures;
@@ -69,7 +71,7 @@ Pictures read_test_sets(const config::LeakageConfig& config, manifests::DigestCa
     std::vector<std::string> shas(dataset.records.size());
     tbb::parallel_for(std::size_t{0}, shas.size(), [&](std::size_t i) {
       if (dataset.records[i].image_path.empty() || run::interrupted()) return;
-      shas[i] = digests.digest_if_present(dataset.records[i].image_path).value_or("");  // absence: told below
+      shas[i] = digests.digest_if_present(dataset.records[i].image_path).value_or("");  // "": reported below
     });
     run::throw_if_interrupted();
     for (std::size_t i = 0; i < shas.size(); ++i) {
@@ -87,7 +89,7 @@ Pictures read_test_sets(const config::LeakageConfig& config, manifests::DigestCa
   return pictures;
 }
 
-// The hashes of those pictures that have one, and which they are.
+// The pictures that have a hash, and their hashes.
 struct HashedPictures {
   std::vector<PictureHash> hashes;
   std::vector<std::size_t> places;
@@ -108,7 +110,7 @@ struct HashedPictures {
   }
 };
 
-// The test picture that a picture of the pool is a copy of.
+// The test picture of which a picture of the pool is a copy.
 struct Copy {
   std::size_t test_picture = 0;
   CopyEvidence evidence = CopyEvidence::same_file;
@@ -141,8 +143,8 @@ std::vector<std::optional<Copy>> find_copies(const Pictures& pool, const Picture
   return copies;
 }
 
-// Adds the groups of pictures that look alike. Files of one content are in a group too, although they count
-// as one picture elsewhere in this file.
+// Adds the groups of pictures that look alike. Files with the same content also form a group, although they
+// count as one picture elsewhere in this file.
 void add_groups(const Pictures& pool, const PictureHashes& known, int max_distance, LeakageReport& report) {
   std::vector<bool> is_grouped(pool.list.size());
   const auto add_files = [&](std::size_t place, std::vector<std::size_t>& samples) {

@@ -1,4 +1,4 @@
-// Pictures of the pool that are in test sets too, and pictures of the pool that are alike.
+// Finds pictures of the pool that are also in test sets, and pictures of the pool that look alike.
 #pragma once
 
 #include <filesystem>
@@ -25,9 +25,9 @@ struct Leak {
 };
 
 struct LeakageReport {
-  std::vector<Leak> leaks;  // by candidate; at most one each, the surest evidence
-  // Files of the pool that look alike or have one content, each by its first candidate: two or more a group,
-  // ascending, groups by their first.
+  std::vector<Leak> leaks;  // sorted by candidate; at most one for each, with the surest evidence
+  // Groups of files of the pool that look alike or have the same content. A group has two or more files, each
+  // given by its first candidate, in ascending order. Groups are sorted by their first member.
   std::vector<std::vector<std::size_t>> groups;
   candidates::LeakageSummary summary;
   std::vector<std::string> notes;
@@ -35,9 +35,9 @@ struct LeakageReport {
 };
 
 // Reads the test sets, hashes every picture that has no hash yet (kept in `cache_folder`/picture_hashes.txt),
-// and compares the pool with them and with itself. Memory: below 1 kB a picture, whatever its size, and the
-// pictures that are being decoded, one a thread. The same report for any number of threads. Throws
-// ConfigError, std::runtime_error, Interrupted.
+// and compares the pool with them and with itself. Memory is below 1 kB for each picture, plus one decoded
+// picture for each thread. The report is the same for any number of threads. Throws ConfigError,
+// std::runtime_error, Interrupted.
 LeakageReport find_leaks(const config::LeakageConfig& config, const candidates::Ingest& pool,
                          manifests::DigestCache& digests, const std::filesystem::path& cache_folder,
                          bool quiet);

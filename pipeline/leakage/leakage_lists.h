@@ -1,4 +1,4 @@
-// Writes what leakage found as files: leaks.csv, duplicates.csv and leakage.json.
+// Writes the results of `leakage` as files: leaks.csv, duplicates.csv and leakage.json.
 #pragma once
 
 #include <filesystem>
@@ -9,11 +9,12 @@
 
 namespace q3d::pipeline::leakage {
 
-// Candidates by evidence ("same file", "same origin", "looks alike"); absent ones have none.
+// Returns the number of candidates by evidence ("same file", "same origin", "looks alike"). Evidence that
+// does not occur is absent.
 std::map<std::string, std::size_t> count_by_evidence(const LeakageReport& report);
 
-// Writes the three into `folder`. They hold sample ids, and nothing of this machine or of the time: equal
-// pools give equal bytes. Throws std::runtime_error.
+// Writes the three files into `folder`. They hold sample ids, but nothing about this machine or the time, so
+// equal pools give equal bytes. Throws std::runtime_error.
 void write_leakage_lists(const std::filesystem::path& folder, const LeakageReport& report,
                          const candidates::Ingest& pool);
 

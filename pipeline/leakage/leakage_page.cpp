@@ -72,7 +72,7 @@ struct Row {
   std::vector<Figure> figures;
 };
 
-// One row a picture of the pool: several animals in it are several leaks.
+// Returns one row for each picture of the pool, in which several animals are several leaks.
 std::vector<Row> leak_rows(const LeakageReport& report, const candidates::Ingest& pool) {
   std::vector<Row> rows;
   std::string before;

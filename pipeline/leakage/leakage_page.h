@@ -1,4 +1,4 @@
-// The pairs and groups that leakage found, to look at.
+// Writes a page that shows the pairs and groups that leakage found.
 #pragma once
 
 #include <filesystem>
@@ -7,8 +7,8 @@
 
 namespace q3d::pipeline::leakage {
 
-// One HTML file with the pictures inside it, small: each copy beside the test picture it is a copy of, then
-// the groups of the pool. The first of each only, which it says; the lists hold all. Throws
+// Writes one HTML file with small pictures inside it. It shows each copy beside its test picture, then the
+// groups of the pool. It shows only the first of each and says so; the lists hold all. Throws
 // std::runtime_error.
 void write_leakage_page(const std::filesystem::path& file, const LeakageReport& report,
                         const candidates::Ingest& pool);

@@ -21,7 +21,7 @@ LeakageRunSummary run_leakage(const config::BuildConfig& config, const run::RunO
                                         : std::max<std::size_t>(1, std::thread::hardware_concurrency()));
   std::filesystem::create_directories(options.out);
   const manifests::FolderLock lock(options.out);
-  manifests::remove_temporaries(options.out);  // what a run that was killed left
+  manifests::remove_temporaries(options.out);  // of a killed run
   manifests::DigestCache digests(options.out / "digests.txt");
   const candidates::Ingest pool = candidates::ingest(config, digests, /*load_bodies=*/{}, options.out);
   const LeakageReport report =

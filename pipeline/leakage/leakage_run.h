@@ -1,4 +1,4 @@
-// `leakage`: the pool of a config compared with its test sets and with itself, written as lists and a page.
+// `leakage`: compares the pool of a config with its test sets and with itself, and writes lists and a page.
 #pragma once
 
 #include <cstddef>

@@ -24,7 +24,7 @@ namespace {
 
 using manifests::PictureHash;
 
-// Another name when the hash of a picture changes: lines of another method are dropped.
+// Change this name when the hash of a picture changes. Lines of another method are dropped.
 constexpr std::string_view kMethod = "dct1";
 
 constexpr std::size_t kBlock = 4096;  // pictures between two writes of the file
@@ -32,7 +32,7 @@ constexpr std::size_t kBlock = 4096;  // pictures between two writes of the file
 constexpr std::size_t kShaDigits = 64;
 constexpr std::size_t kHashDigits = 16;
 
-// "dct1 <key> <upright> <mirrored>", or "dct1 <key> -" for a picture without a hash.
+// Returns "dct1 <key> <upright> <mirrored>", or "dct1 <key> -" for a picture without a hash.
 std::string line_of(const std::string& key, const std::optional<PictureHash>& hash) {
   if (!hash) return fmt::format("{} {} -", kMethod, key);
   return fmt::format("{} {} {:016x} {:016x}", kMethod, key, hash->upright, hash->mirrored);
@@ -46,7 +46,7 @@ bool parse_hash(std::string_view digits, std::uint64_t& hash) {
 std::optional<PictureHash> hash_file(const PictureFile& picture) {
   const loaders::pictures::DecodedImage image =
       loaders::pictures::decode_image(std::filesystem::path(picture.path));
-  if (image.failure == manifests::Reason::image_missing) {  // it was there when it was digested
+  if (image.failure == manifests::Reason::image_missing) {  // it existed when it was digested
     throw std::runtime_error(
         fmt::format("{}: it could be read before and cannot now; put it back and run again", image.detail));
   }
@@ -113,8 +113,8 @@ std::optional<PictureHash> PictureHashes::find(const std::string& key) const {
   return found == hashes_.end() ? std::nullopt : found->second;
 }
 
-// A line that a kill cuts short fails its check when read, and so does the one that is appended to it: two
-// pictures to hash again.
+// Appends lines to the file. If a kill cuts a line short, that line and the next one, which is appended to
+// it, fail their check when read. Their two pictures are hashed again.
 void PictureHashes::append(const std::vector<const PictureFile*>& pictures) const {
   std::string lines;
   for (const PictureFile* picture : pictures) {

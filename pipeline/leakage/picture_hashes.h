@@ -1,4 +1,4 @@
-// Perceptual hashes of pictures on disk, made once for each content.
+// Keeps perceptual hashes of pictures on disk, computed once for each content.
 #pragma once
 
 #include <filesystem>
@@ -14,21 +14,21 @@ namespace q3d::pipeline::leakage {
 struct PictureFile {
   std::string path;
   std::string sha256;
-  int orientation = 1;  // EXIF's, by which the dataset turns the picture
+  int orientation = 1;  // EXIF orientation by which the dataset turns the picture
 
-  // The key of the remembered hash: the SHA-256, and the orientation if it turns the picture.
+  // Returns the key of the remembered hash: the SHA-256, and the orientation if it turns the picture.
   std::string key() const;
 };
 
-// Remembers hashes by the pictures' keys in one file of checked lines, which grows as pictures are hashed:
-// a run that is stopped loses the last few thousand at most.
+// Remembers hashes by the pictures' keys in one file of checked lines, which grows while pictures are hashed.
+// A run that is stopped loses at most the last few thousand.
 class PictureHashes {
  public:
-  // Loads the file if it is there; a damaged line is dropped. Throws std::runtime_error when unreadable.
+  // Loads the file if it exists; a damaged line is dropped. Throws std::runtime_error if it cannot be read.
   explicit PictureHashes(std::filesystem::path file);
 
-  // Hashes, in parallel, those that are not known yet, and appends them to the file. A picture that cannot be
-  // decoded, or is one colour, has no hash. Throws std::runtime_error for one that is gone,
+  // Hashes, in parallel, the pictures that are not known yet, and appends the hashes to the file. A picture
+  // that cannot be decoded, or is one colour, has no hash. Throws std::runtime_error for one that is gone,
   // manifests::IoError for one that cannot be read, Interrupted.
   void add(const std::vector<PictureFile>& pictures, bool quiet);
 

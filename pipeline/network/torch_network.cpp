@@ -37,7 +37,7 @@ torch::Tensor on_host(const torch::Tensor& tensor) {
   return tensor.to(torch::kCPU, torch::kFloat32).contiguous();
 }
 
-// Splits a batch into rows; one device-to-host copy a field.
+// Splits a batch into rows, with one device-to-host copy for each field.
 void append_rows(const model::Prediction& batch, std::vector<device::BodyPrediction>& rows) {
   const torch::Tensor rotations = on_host(batch.rotations);
   const torch::Tensor betas = on_host(batch.betas);
@@ -60,7 +60,7 @@ void append_rows(const model::Prediction& batch, std::vector<device::BodyPredict
   }
 }
 
-// (B, 3, 256, 256) uint8 from interleaved rows.
+// Returns (B, 3, 256, 256) uint8 from interleaved rows.
 torch::Tensor stack_patches(std::span<const device::PatchView> patches) {
   torch::Tensor batch =
       torch::empty({static_cast<std::int64_t>(patches.size()), kSide, kSide, 3}, torch::kUInt8);
@@ -73,7 +73,7 @@ torch::Tensor stack_patches(std::span<const device::PatchView> patches) {
   return batch.permute({0, 3, 1, 2}).contiguous();
 }
 
-// The description of the device counts the threads, so they are set first.
+// Chooses the device. Its description contains the number of threads, so that is set first.
 model::DeviceChoice choose_device(const config::NetworkConfig& network, int threads) {
   model::configure_compute(threads);
   try {
@@ -141,8 +141,8 @@ class TorchNetwork : public device::Network {
  private:
   // OpenMP's thread count belongs to the calling thread, so it is set wherever work begins.
   void begin() const { model::configure_compute(threads_); }
-  // On a CPU pictures are encoded one by one: that is as fast, since the matrices are packed, and a picture's
-  // features then depend on no other picture.
+  // Returns whether pictures are encoded one by one, as on a CPU. With packed matrices this is as fast as a
+  // batch, and a picture's features then do not depend on other pictures.
   bool encodes_singly() const { return prima_.device().is_cpu(); }
   model::ImageFeatures encode(std::span<const device::PatchView> patches) const;
   model::ImageFeatures features_of(std::span<const device::AdaptRequest> requests) const;

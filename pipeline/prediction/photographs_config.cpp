@@ -14,7 +14,8 @@ config::BuildConfig photographs_config(const fs::path& folder, const PhotographO
                          {"min_confidence", options.min_score}};
   if (!options.boxes.empty()) dataset["annotations"] = fs::absolute(options.boxes).string();
   if (!options.species.empty()) dataset["species"] = options.species;
-  // Thresholds of the config's own datasets have no meaning here.
+  // This replaces the config's own datasets, and their thresholds are dropped because they have no meaning
+  // here.
   settings.push_back("datasets=" + nlohmann::json::array({dataset}).dump());
   settings.emplace_back("filter=null");
   return config::load_build_config(files, settings);

@@ -28,7 +28,7 @@ namespace {
 
 using manifests::Reason;
 
-// Raise it when a change of the code changes what adaptation without a verdict gives.
+// Raise this number when a change of the code changes the result of adaptation without a verdict.
 constexpr int kAdaptCode = 1;
 
 std::string adapt_key(const config::BuildConfig& config, const std::string& predict_key, int iterations) {
@@ -48,7 +48,7 @@ void require_network(const config::BuildConfig& config) {
   }
 }
 
-// Takes every unit through prediction and, where it is asked for, adaptation.
+// Takes every unit through prediction and, if requested, adaptation.
 class Predictor {
  public:
   Predictor(const config::BuildConfig& config, const PredictOptions& options, build::Workspace& workspace)
@@ -91,7 +91,7 @@ class Predictor {
     return work;
   }
 
-  // The pictures are decoded where something is still to be computed from them.
+  // Decodes the pictures from which something remains to be computed.
   void decode(unit::UnitWork& work) const {
     const bool is_done = work.predicted && (!adaptations_ || work.refined);
     if (is_done) return;
@@ -143,7 +143,7 @@ class Predictor {
     return samples;
   }
 
-  // The number of a unit's animals that were adapted.
+  // Returns how many of a unit's animals were adapted.
   static std::int64_t adapted(const unit::UnitWork& work) {
     return static_cast<std::int64_t>(work.refined ? work.refined->size() : 0);
   }
@@ -171,8 +171,8 @@ class Predictor {
     count_the_rest(work);
   }
 
-  // Adaptation takes most of the time, so with it an animal counts when it is adapted, and the others when
-  // their unit is through.
+  // Counts the animals of a finished unit that were not counted before. Adaptation takes most of the time, so
+  // an animal counts when it is adapted, and the others when their unit is finished.
   void count_the_rest(const unit::UnitWork& work) {
     const auto all = static_cast<std::int64_t>(work.unit->count);
     if (!adaptations_) {

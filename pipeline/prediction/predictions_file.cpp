@@ -10,13 +10,13 @@ namespace {
 
 using nlohmann::ordered_json;
 
-// Returns where a point of the crop lies in the picture. The crop is not turned, so its axes are the
+// Returns the position of a crop's point in the picture. The crop is not rotated, so its axes are the
 // picture's.
 std::array<double, 2> in_picture(const smal::CropPoint& point, const loaders::pictures::SquareBox& box) {
   return {box.center_x_px + box.side_px * point.x, box.center_y_px + box.side_px * point.y};
 }
 
-// The pinhole camera that sees the whole picture as the crop's camera sees the crop.
+// Returns the pinhole camera of the whole picture that agrees with the crop's camera inside the crop.
 ordered_json camera_json(const loaders::pictures::SquareBox& box) {
   return {{"focal_px", smal::kFocalInCropUnits * box.side_px},
           {"principal_point_px", {box.center_x_px, box.center_y_px}}};

@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::size_t kPacket = 8;
 
-// Embree 3 passes a context by pointer before the rays, Embree 4 optional arguments after them.
+// Embree 3 takes a context by pointer before the rays; Embree 4 takes optional arguments after them.
 #if RTC_VERSION_MAJOR >= 4
 void intersect(const int* valid, RTCScene scene, RTCRayHit8& rays) {
   RTCIntersectArguments arguments;
@@ -106,7 +106,7 @@ RayMesh::RayMesh(const RayDevice& device, std::span<const Eigen::Vector3f> verti
   rtcCommitGeometry(geometry);
   rtcAttachGeometry(handle_->scene, geometry);
   rtcReleaseGeometry(geometry);
-  // An arena of one thread: pictures are what runs in parallel, and a hierarchy that one thread builds is
+  // The arena has one thread: pictures run in parallel already, and a hierarchy that one thread builds is
   // always the same.
   tbb::task_arena alone(1);
   alone.execute([&] { rtcCommitScene(handle_->scene); });

@@ -1,4 +1,4 @@
-// Ray casting against one triangle mesh. The only part of the world that knows Embree.
+// Casts rays against one triangle mesh. No other file uses Embree.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,7 +15,7 @@ struct SurfaceHit {
   static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
   std::uint32_t triangle = kNone;
   float u = 0.0F, v = 0.0F;  // weights of the triangle's second and third corner
-  float distance = 0.0F;     // in lengths of the ray's direction
+  float distance = 0.0F;     // in multiples of the direction's length
   bool found() const { return triangle != kNone; }
 };
 
@@ -33,7 +33,8 @@ class RayDevice {
   std::unique_ptr<Handle> handle_;
 };
 
-// A mesh made ready for rays. Immutable; queries are thread-safe. The device must outlive it.
+// A mesh that is prepared for ray queries. It is immutable, and queries are thread-safe. The device must
+// outlive it.
 class RayMesh {
  public:
   RayMesh(const RayDevice& device, std::span<const Eigen::Vector3f> vertices,
@@ -42,10 +43,11 @@ class RayMesh {
   RayMesh(const RayMesh&) = delete;
   RayMesh& operator=(const RayMesh&) = delete;
 
-  // The nearest surface from the origin of coordinates along each direction; hits has the directions' length.
+  // Finds the nearest surface along each direction from the origin of coordinates. `hits` must have as many
+  // elements as `directions`.
   void nearest(std::span<const Eigen::Vector3f> directions, std::span<SurfaceHit> hits) const;
 
-  // blocked[i] = 1 when something lies on the ray from origins[i] along the common direction, else 0.
+  // Sets blocked[i] to 1 if the mesh lies on the ray from origins[i] along the common direction, else to 0.
   void blocked(std::span<const Eigen::Vector3f> origins, const Eigen::Vector3f& direction,
                std::span<std::uint8_t> blocked) const;
 

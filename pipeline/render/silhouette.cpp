@@ -19,7 +19,7 @@ struct Point {
   double x, y;
 };
 
-// Twice the signed area of a, b, c.
+// Returns twice the signed area of the triangle a, b, c.
 double cross(Point a, Point b, Point c) {
   return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
 }
@@ -28,7 +28,7 @@ bool is_finite(Point p) {
   return std::isfinite(p.x) && std::isfinite(p.y);
 }
 
-// First and last pixel centre of [low, high] in an image of `side` pixels.
+// Returns the first and the last pixel centre in [low, high] of an image of `side` pixels.
 std::array<int, 2> pixels_between(double low, double high, int side) {
   const auto beyond = static_cast<double>(side);
   return {static_cast<int>(std::ceil(std::clamp(low, 0.0, beyond))),

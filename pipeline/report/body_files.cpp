@@ -27,7 +27,7 @@ Eigen::Vector3f turned(const Eigen::Vector3f& vertex) {
   return {vertex.x(), -vertex.y(), -vertex.z()};
 }
 
-// Line feeds would end a comment.
+// Replaces line feeds, which would end a comment.
 std::string one_line(std::string text) {
   for (char& c : text) {
     if (c == '\n' || c == '\r') c = ' ';
@@ -52,7 +52,7 @@ void append_number(std::vector<std::byte>& bytes, std::uint32_t number) {
   append(bytes, &number, sizeof(number));
 }
 
-// Chunks of a GLB are multiples of 4 bytes.
+// Appends a chunk, padded because the size of a GLB chunk is a multiple of 4 bytes.
 void append_chunk(std::vector<std::byte>& file, std::uint32_t type, std::vector<std::byte> content,
                   char filler) {
   content.resize((content.size() + 3) / 4 * 4, static_cast<std::byte>(filler));
@@ -134,7 +134,7 @@ std::vector<std::byte> glb_bytes(const PhotoBody& body, Faces faces) {
     append(buffer, point.data(), 3 * sizeof(float));
   }
   for (const auto& face : faces) append(buffer, face.data(), sizeof(face));
-  // Ids may hold any bytes; JSON text is UTF-8.
+  // Ids may hold any bytes, but JSON text must be UTF-8.
   const std::string json =
       scene(body, faces.size(), extent).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   std::vector<std::byte> header;

@@ -1,4 +1,4 @@
-// Bodies as files for 3D programs: Wavefront OBJ and binary glTF.
+// Writes bodies as files for 3D programs: Wavefront OBJ and binary glTF.
 #pragma once
 
 #include <array>

@@ -25,7 +25,7 @@ constexpr const char* kInk = "#222";
 constexpr double kDotPx = 4;
 constexpr std::size_t kTableSteps = 10;
 
-// The axis of tau ends where nearly all of the pool has been let in; a few errors lie far beyond.
+// The axis of tau ends at this yield, because a few errors lie far beyond.
 constexpr double kShownYield = 0.95;
 constexpr double kBeyondTauHigh = 1.25;
 
@@ -37,7 +37,7 @@ double last_tau(const filters::CalibratedPool& pool) {
   return last;
 }
 
-// 1, 2 or 5 times a power of ten, so that five steps or so fill the range.
+// Returns 1, 2 or 5 times a power of ten, so that about five steps fill the range.
 double tick_step(double range) {
   const double raw = range / 5.0;
   const double power = std::pow(10.0, std::floor(std::log10(raw)));
@@ -101,7 +101,7 @@ class Panel {
     svg_.polyline(places, colour);
   }
 
-  // `row` keeps the two labels apart where the thresholds lie close together.
+  // Draws a chosen point. `row` separates the two labels if the thresholds lie close together.
   void chosen(const char* name, const YieldPoint& point, int row) {
     const double x = x_of(point.tau);
     svg_.line({x, y_of(100)}, {x, y_of(0)}, "stroke=\"#222\" stroke-dasharray=\"5 4\"");

@@ -1,4 +1,4 @@
-// The calibration as a picture: yield and AUC against the threshold, and the chosen points.
+// Draws the calibration: yield and AUC against the threshold, and the chosen points.
 #pragma once
 
 #include <span>
@@ -8,10 +8,10 @@
 
 namespace q3d::pipeline::report {
 
-// An SVG document, one panel a pool.
+// Returns an SVG document with one panel for each pool.
 std::string calibration_figure(std::span<const filters::CalibratedPool> pools);
 
-// The same as text: a line for each tenth of the yield and for the chosen thresholds.
+// Returns the same as text, with a line for each tenth of the yield and for the chosen thresholds.
 std::string calibration_table(const filters::CalibratedPool& pool);
 
 }  // namespace q3d::pipeline::report

@@ -24,12 +24,12 @@ namespace fs = std::filesystem;
 
 constexpr int kTilePx = 260;
 
-// A shard lies in the folder `shards` of its dataset, unless somebody moved it.
+// Returns the dataset's folder. A shard lies in the folder `shards` of its dataset, unless somebody moved it.
 fs::path dataset_of(const fs::path& path) {
   return fs::is_directory(path) ? path : fs::absolute(path).parent_path().parent_path();
 }
 
-// Null where no body model is found; a note says why.
+// Returns null if no body model is found; a note then says why.
 std::unique_ptr<device::BodyMeshes> bodies_for(const SheetOptions& options,
                                                const device::BodyMeshesLoader& load_bodies) {
   if (!options.body.empty() && !fs::is_directory(options.path)) return load_bodies(options.body);

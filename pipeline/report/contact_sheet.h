@@ -1,4 +1,4 @@
-// A picture of what a dataset holds: crops with the labelled bodies and the annotated keypoints.
+// Draws a picture of a dataset's samples: crops with the labelled bodies and the annotated keypoints.
 #pragma once
 
 #include <filesystem>
@@ -16,9 +16,9 @@ struct SheetOptions {
 };
 
 // Writes a PNG grid with a legend. Each cell shows a sample's label as a mesh, the annotated keypoints, the
-// keypoints of the label, and below them the whole id and the errors. Where no body model is found, the
-// meshes are left out and a note says so. Throws std::runtime_error when the shards hold no pictures or the
-// file cannot be written.
+// keypoints of the label, and below them the whole id and the errors. If no body model is found, the meshes
+// are left out and a note says so. Throws std::runtime_error if the shards hold no pictures or the file
+// cannot be written.
 void write_contact_sheet(const SheetOptions& options, const device::BodyMeshesLoader& load_bodies);
 
 }  // namespace q3d::pipeline::report

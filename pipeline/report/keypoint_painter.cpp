@@ -36,7 +36,7 @@ bool is_drawable(cv::Point2d point) {
   return std::abs(point.x) < 1e5 && std::abs(point.y) < 1e5;  // false for NaN too
 }
 
-// A line with a dark rim, to be seen on any background.
+// Draws a line with a dark rim, so that it is visible on any background.
 void draw_line(cv::Mat& tile, cv::Point2d from, cv::Point2d to, const cv::Scalar& colour, int width) {
   if (!is_drawable(from) || !is_drawable(to)) return;
   cv::line(tile, fixed(from), fixed(to), colours::kInk, width + 2, cv::LINE_AA, kFractionBits);

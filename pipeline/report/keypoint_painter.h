@@ -1,4 +1,4 @@
-// Draws keypoints over pictures: the annotated ones with the bones between them, and where a body's lie.
+// Draws keypoints over pictures: the annotated ones with the bones between them, and those of a body.
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -18,14 +18,14 @@ struct Bone {
   Side side = Side::middle;
 };
 
-// The lines that are drawn between the 26 keypoints of Animal3D.
+// Returns the lines that are drawn between the 26 keypoints of Animal3D.
 std::span<const Bone> bones();
 
-// Blue for the left, orange for the right, white for the middle.
+// Returns blue for the left, orange for the right, and white for the middle.
 const cv::Scalar& colour_of(Side side);
 
-// Returns where a point of the network's crop lies in a square tile that shows `context` times the crop. x
-// and y in crop units.
+// Returns the position of a point of the network's crop in a square tile that shows `context` times the crop.
+// x and y are in crop units.
 cv::Point2d to_tile(double x, double y, int tile_side_px, double context);
 
 // Draws the visible annotated keypoints as discs, with their bones. `projected` may be null; else each of its

@@ -44,7 +44,8 @@ struct View {
   }
 };
 
-// Returns where a part of this length begins: around `centre`, and inside the whole as far as there is room.
+// Returns where a part of this length begins. It is centred at `centre`, but stays inside the whole if
+// possible.
 double start_of(double centre, double part, double whole) {
   return part >= whole ? (whole - part) / 2.0 : std::clamp(centre - part / 2.0, 0.0, whole - part);
 }
@@ -96,7 +97,7 @@ std::vector<Mark> marks_of(const SampleRecord& record, const View& view,
 }
 
 // Returns a place for a text near a dot that covers no dot and no other text: beside the dot if there is
-// room, else on growing rings around it. The first place is taken if there is none.
+// room, else on growing rings around it. If there is no free place, the first one is used.
 cv::Rect free_place(cv::Point dot, cv::Size size, const std::vector<cv::Rect>& taken) {
   const cv::Rect tile(0, 0, kTilePx, kTilePx);
   constexpr int kReachPx = kDotPx + 3;
@@ -123,7 +124,7 @@ cv::Rect free_place(cv::Point dot, cv::Size size, const std::vector<cv::Rect>& t
   return beside;
 }
 
-// Connects a text with its dot where it does not lie beside it.
+// Connects a text with its dot if the text is not beside it.
 void draw_leader(cv::Mat& tile, const Mark& mark, const cv::Rect& room) {
   const cv::Point end(std::clamp(mark.place.x, room.x, room.x + room.width),
                       std::clamp(mark.place.y, room.y, room.y + room.height));

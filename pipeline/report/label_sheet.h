@@ -1,4 +1,4 @@
-// A picture that shows which keypoints are left and which are right.
+// Draws a picture that shows which keypoints are left and which are right.
 #pragma once
 
 #include <filesystem>

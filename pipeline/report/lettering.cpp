@@ -11,7 +11,7 @@ double scale_of(TextSize size) {
   return size == TextSize::small ? 0.38 : 0.45;
 }
 
-// OpenCV's fonts have one '?' for each byte that they lack; a character gets one alone.
+// Replaces each character beyond ASCII by a single '?'. OpenCV's fonts would draw one for each byte.
 std::string printable(const std::string& text) {
   std::string shown;
   for (const char c : text) {

@@ -1,4 +1,4 @@
-// Text on pictures.
+// Writes text on pictures.
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -17,7 +17,7 @@ inline const cv::Scalar kWhite(255, 255, 255);
 inline const cv::Scalar kInk(20, 20, 20);
 inline const cv::Scalar kGrey(110, 110, 110);
 inline const cv::Scalar kPaper(250, 250, 248);
-inline const cv::Scalar kEmpty(226, 226, 224);  // where a panel has nothing to show
+inline const cv::Scalar kEmpty(226, 226, 224);  // for a panel that has nothing to show
 }  // namespace colours
 
 enum class TextSize { small, normal };
@@ -34,7 +34,7 @@ std::vector<std::string> wrapped(const std::string& text, int width_px, TextSize
 void write(cv::Mat& picture, const std::string& text, cv::Point at, TextSize size,
            const cv::Scalar& colour = colours::kInk);
 
-// The same with a dark rim, to be read on any background.
+// Writes a line with a dark rim, so that it is readable on any background.
 void write_on_photo(cv::Mat& picture, const std::string& text, cv::Point at, TextSize size,
                     const cv::Scalar& colour = colours::kWhite);
 

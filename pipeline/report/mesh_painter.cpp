@@ -13,14 +13,14 @@
 namespace q3d::pipeline::report {
 namespace {
 
-constexpr int kRaysPerSide = 2;  // of a pixel
+constexpr int kRaysPerSide = 2;  // rays along each side of a pixel
 constexpr float kAmbient = 0.4F;
-constexpr double kFilledShare = 0.84;  // of a tile, by the side view
+constexpr double kFilledShare = 0.84;  // fraction of a tile that the side view fills
 
 // The direction from the surface to the light, which is at the upper left, behind the camera.
 const Eigen::Vector3f kToLight = Eigen::Vector3f(-0.35F, -0.65F, -0.75F).normalized();
 
-// A normal for each vertex: the sum of its triangles' normals, which weighs them by their area.
+// Returns a normal for each vertex, which is the area-weighted sum of its triangles' normals.
 Vertices vertex_normals(const Vertices& vertices, std::span<const render::Triangle> triangles) {
   Vertices normals(vertices.size(), Eigen::Vector3f::Zero());
   for (const render::Triangle& triangle : triangles) {
@@ -31,8 +31,8 @@ Vertices vertex_normals(const Vertices& vertices, std::span<const render::Triang
   return normals;
 }
 
-// Pixels that the mesh may touch: those between its vertices' projections. All, if a vertex lies behind the
-// camera.
+// Returns the pixels that the mesh may touch, which is the bounding box of its projected vertices, or the
+// whole tile if a vertex lies behind the camera.
 cv::Rect touched(const Vertices& vertices, const TileCamera& camera, int side) {
   double left = side, top = side, right = 0, bottom = 0;
   for (const Eigen::Vector3f& vertex : vertices) {
@@ -67,7 +67,8 @@ Vertices side_view(const Vertices& vertices, const TileCamera& camera, int tile_
   for (const Eigen::Vector3f& vertex : vertices) box.extend(vertex);
   const Eigen::Vector3f middle = box.center();
   const Eigen::Vector3f size = box.sizes();
-  // After the turn the extent in z is the width. The nearest point is half the old width before the middle.
+  // After the turn, the width in the picture is the old extent in z, and the nearest point lies half the old
+  // width before the middle.
   const double widest = std::max(size.z(), size.y());
   const auto depth =
       static_cast<float>(camera.focal_px * widest / (kFilledShare * tile_side_px) + size.x() / 2.0F);
@@ -83,7 +84,7 @@ Vertices side_view(const Vertices& vertices, const TileCamera& camera, int tile_
 struct MeshPainter::Rays {
   render::RayDevice device;
   std::vector<render::Triangle> triangles;
-  std::size_t vertices = 0;  // that the triangles name
+  std::size_t vertices = 0;  // number of vertices that the triangles use
 };
 
 MeshPainter::MeshPainter(std::span<const std::array<std::int32_t, 3>> faces)

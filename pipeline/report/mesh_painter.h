@@ -1,4 +1,4 @@
-// Draws bodies over pictures: rays against the mesh, shaded, with smooth edges.
+// Draws bodies over pictures by casting rays against the mesh, shaded and with smooth edges.
 #pragma once
 
 #include <Eigen/Core>
@@ -19,14 +19,14 @@ struct TileCamera {
   double centre_px = 0.0;
 };
 
-// The camera of the network's crop in a square tile that shows `context` times the crop. Tile pixel i shows
-// the crop coordinate (i / side - 0.5) * context, as in loaders::pictures::keypoints_to_crop.
+// Returns the camera of the network's crop in a square tile that shows `context` times the crop. Tile pixel i
+// shows the crop coordinate (i / side - 0.5) * context, as in loaders::pictures::keypoints_to_crop.
 TileCamera crop_camera(int tile_side_px, double context);
 
 using Vertices = std::vector<Eigen::Vector3f>;
 
-// The same body seen from its left or right side in the photograph: turned by 90 degrees about the vertical
-// axis through its middle, and moved along z until it fills the tile.
+// Returns the same body as seen from its left or right in the photograph: turned by 90 degrees about the
+// vertical axis through its middle, and moved along z until it fills the tile.
 Vertices side_view(const Vertices& vertices, const TileCamera& camera, int tile_side_px);
 
 class MeshPainter {
@@ -37,8 +37,8 @@ class MeshPainter {
   MeshPainter& operator=(const MeshPainter&) = delete;
 
   // Draws the mesh into an 8-bit RGB tile. `vertices` are in the camera's frame; triangles that reach behind
-  // the camera draw nothing. `opacity` is that of a pixel that the mesh covers whole. Returns the share of
-  // each pixel that it covers, 0 to 255. Throws std::invalid_argument for another number of vertices than the
+  // the camera draw nothing. `opacity` applies to a pixel that the mesh covers completely. Returns the
+  // coverage of each pixel, 0 to 255. Throws std::invalid_argument for another number of vertices than the
   // faces name, or another kind of tile.
   cv::Mat paint(cv::Mat& tile, const Vertices& vertices, const TileCamera& camera, const cv::Scalar& colour,
                 double opacity) const;

@@ -52,7 +52,7 @@ bool passes(const VerdictRow& row, const Choice& choice) {
          is_among(std::string(manifests::to_string(row.family)), choice.families);
 }
 
-// A whole id is that candidate; otherwise every id that holds the text.
+// Returns the candidate with this id, or else every candidate whose id contains the text.
 std::vector<VerdictRow> with_id(const std::vector<VerdictRow>& rows, const std::string& id) {
   std::vector<VerdictRow> found;
   for (const VerdictRow& row : rows) {
@@ -87,7 +87,7 @@ std::vector<VerdictRow> named(const std::vector<VerdictRow>& rows, const std::ve
   return found;
 }
 
-// Ascending by the number; rows without one go.
+// Sorts the rows by the number, ascending, and drops rows without one.
 void sort_by(std::vector<VerdictRow>& rows, const std::function<double(const VerdictRow&)>& number) {
   std::erase_if(rows, [&](const VerdictRow& row) { return !std::isfinite(number(row)); });
   std::stable_sort(rows.begin(), rows.end(),

@@ -33,7 +33,7 @@ Vertices in_camera(const device::BodyMesh& mesh, const smal::Translation& transl
   return vertices;
 }
 
-// A panel that has nothing to show.
+// Returns a panel that has nothing to show and says why.
 cv::Mat empty_panel(const std::string& why, int side_px) {
   cv::Mat tile(side_px, side_px, CV_8UC3, colours::kEmpty);
   int y = side_px / 2 - 20;
@@ -180,7 +180,7 @@ cv::Mat OverlayPainter::captioned(const OverlaySubject& subject, std::span<const
   add(subject.row.id, TextSize::normal);
   add(verdict_line(subject.row), TextSize::small);
   if (!subject.why.empty()) add(subject.why, TextSize::small);
-  int height = line_height_px(TextSize::small) + kGapPx;  // of the titles
+  int height = line_height_px(TextSize::small) + kGapPx;  // height of the titles
   for (const Line& line : lines) height += line_height_px(line.size);
   cv::Mat cell(height + pictures.rows, pictures.cols, CV_8UC3, colours::kPaper);
   int y = 0;

@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kLongestStem = 150;  // names of files end at 255 bytes
+constexpr std::size_t kLongestStem = 150;  // file names have at most 255 bytes
 
 void write_png(const fs::path& path, const cv::Mat& picture) {
   manifests::write_file_atomically(path, std::span<const std::byte>(loaders::pictures::encode_png(picture)));

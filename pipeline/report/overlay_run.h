@@ -1,4 +1,4 @@
-// `overlay`: pictures and 3D files of chosen candidates.
+// `overlay`: writes pictures and 3D files of chosen candidates.
 #pragma once
 
 #include <filesystem>
@@ -21,8 +21,8 @@ struct OverlayOptions {
   Choice choice;
   std::vector<Panel> panels{kAllPanels.begin(), kAllPanels.end()};
   bool captions = true;
-  std::filesystem::path folder;  // one PNG a candidate; empty: none
-  std::filesystem::path sheet;   // all in one PNG; empty: none
+  std::filesystem::path folder;  // folder for one PNG for each candidate; empty: none
+  std::filesystem::path sheet;   // file for one PNG of all; empty: none
   int columns = 1;               // of the sheet
   bool obj = false;              // into the folder
   bool glb = false;
@@ -34,22 +34,22 @@ struct OverlaySummary {
   std::vector<std::string> without_body;  // ids for which --obj and --glb had nothing to write
 };
 
-// A name for the files of a candidate: its id in letters that every file system takes, and some digits of the
-// id's SHA-256, since two ids may become the same letters.
+// Returns a name for the files of a candidate: its id in characters that every file system accepts, and some
+// digits of the id's SHA-256, because two ids may become the same characters.
 std::string file_stem(const std::string& id);
 
-// The body model of a dataset was not found; the text says what to do.
+// Says that the body model of a dataset was not found, and what to do.
 class MissingBodyModel : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-// Returns where the body model of a dataset lies. Throws MissingBodyModel, and as SourceFiles::body_model.
+// Returns the path of a dataset's body model. Throws MissingBodyModel, and as SourceFiles::body_model does.
 std::filesystem::path find_body_model(const dataset::PublishedDataset& dataset, const SourceFiles& files,
                                       const std::filesystem::path& given);
 
-// Draws the chosen candidates and writes what was asked for, each file whole or not at all. Throws
-// ConfigError for a choice that makes no sense and std::runtime_error when nothing was chosen.
+// Draws the chosen candidates and writes the requested files, each completely or not at all. Throws
+// ConfigError for a choice that makes no sense and std::runtime_error if no candidate was chosen.
 OverlaySummary draw_overlays(const OverlayOptions& options, const device::BodyMeshesLoader& load_bodies);
 
 }  // namespace q3d::pipeline::report

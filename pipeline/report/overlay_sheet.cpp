@@ -81,7 +81,7 @@ cv::Mat overlay_sheet(const std::vector<cv::Mat>& pictures, std::span<const Pane
     const int column = static_cast<int>(i) % across;
     const int line = heights[i / static_cast<std::size_t>(across)];
     const int x = kMarginPx + column * (cell_width + kMarginPx);
-    // A picture stands at the bottom of its line, so that pictures whose captions differ in length stand
+    // A picture is aligned to the bottom of its line, so that pictures with captions of different heights are
     // level.
     pictures[i].copyTo(sheet(cv::Rect(x, y + line - pictures[i].rows, pictures[i].cols, pictures[i].rows)));
     if (column == across - 1 || i + 1 == pictures.size()) y += line + kMarginPx;

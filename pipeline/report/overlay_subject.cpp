@@ -17,7 +17,8 @@ namespace {
 
 using manifests::LabelKind;
 
-// A source picture is reduced to this side at most; the widest panel shows the box in fewer pixels.
+// A source picture is reduced to at most this side, which exceeds the pixels in which the widest panel shows
+// the box.
 constexpr int kPictureSidePx = 720;
 
 std::optional<device::BodyPrediction> with_projection(const device::BodyPrediction& body) {
@@ -76,7 +77,8 @@ class SubjectReader {
     return dataset::why(row.judgement, dataset_.role(row), thresholds);
   }
 
-  // Nothing where the folder is gone, or the tables are of other candidates.
+  // Reads the tables of the stages. Reads nothing if the folder is gone or the tables belong to other
+  // candidates.
   void read_stages(const dataset::VerdictRow& row, OverlaySubject& subject) {
     const std::int64_t unit = dataset_.unit_of(row);
     if (unit != unit_) {
@@ -139,7 +141,7 @@ class SubjectReader {
 
   const dataset::PublishedDataset& dataset_;
   const SourceFiles& files_;
-  std::int64_t unit_ = -1;  // whose tables are in tables_
+  std::int64_t unit_ = -1;  // the unit whose tables are in tables_
   UnitTables tables_;
 };
 

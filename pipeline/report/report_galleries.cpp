@@ -34,7 +34,7 @@ std::string data_uri(const cv::Mat& picture) {
   return "data:image/jpeg;base64," + base64;
 }
 
-// The `size` rows of least distance; rows without one (NaN) are left out.
+// Returns the `size` rows of least distance. Rows without a distance (NaN) are left out.
 std::vector<VerdictRow> nearest(const std::vector<VerdictRow>& rows, std::size_t size,
                                 const std::function<double(const VerdictRow&)>& distance) {
   std::vector<std::pair<double, const VerdictRow*>> order;
@@ -66,7 +66,7 @@ std::vector<GalleryPlan> plan_galleries(const dataset::PublishedDataset& dataset
   const auto kept = [](const VerdictRow& row, double value) {
     return row.label ? value : std::numeric_limits<double>::quiet_NaN();
   };
-  // |number - the threshold of its dataset|, where it was judged.
+  // Returns |number - the threshold of its dataset| if the candidate was judged.
   const auto to_threshold = [&](double filters::Thresholds::*threshold, auto number) {
     return [&thresholds, threshold, number](const VerdictRow& row) {
       const auto found = thresholds.find(row.dataset);

@@ -1,4 +1,5 @@
-// The pictures of the report: candidates worth looking at, with their stories.
+// Chooses and draws the pictures of the report: candidates that are worth looking at, with the text of
+// `explain`.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -19,13 +20,14 @@ struct GalleryPlan {
   std::vector<dataset::VerdictRow> rows;
 };
 
-// The best and the worst labels, the candidates nearest to tau_low, tau_high and delta, and random ones, at
-// most `size` each. The random ones are drawn by the candidates' ids, so the same dataset gives the same.
+// Returns the galleries of the best and the worst labels, of the candidates nearest to tau_low, tau_high and
+// delta, and of random ones, with at most `size` rows each. The random choice depends only on the candidates'
+// ids, so the same dataset always gives the same galleries.
 std::vector<GalleryPlan> plan_galleries(const dataset::PublishedDataset& dataset,
                                         const std::vector<dataset::VerdictRow>& rows, std::size_t size);
 
 // [{title, meaning, open, panels: [names], cards: [{id, line, why, story, picture, width, height}]}]. A
-// picture is a data URI of a JPEG; `story` is what `explain` tells. Galleries without rows are left out.
+// picture is a data URI of a JPEG; `story` is the text of `explain`. Galleries without rows are left out.
 nlohmann::ordered_json draw_galleries(const dataset::PublishedDataset& dataset, const SourceFiles& files,
                                       const OverlayPainter& painter, const std::vector<GalleryPlan>& plans);
 

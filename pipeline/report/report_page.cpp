@@ -14,7 +14,8 @@ std::string script_json(const nlohmann::ordered_json& document) {
   std::string text;
   text.reserve(json.size());
   for (const char c : json) {
-    // "</script" and "<!--" begin with it; in JSON it stands inside texts only, where the escape is the same.
+    // "</script" and "<!--" begin with '<'. In JSON it occurs only inside texts, where the escape means the
+    // same.
     if (c == '<') {
       text += "\\u003c";
     } else {
@@ -33,7 +34,7 @@ std::string report_html(const nlohmann::ordered_json& statistics, const nlohmann
        {"@PICTURES@", script_json(pictures)},
        {"@PLOTLY@", std::string(plotly_script())},
        {"@SCRIPT@", scripts}}};
-  // The template is walked once, so that a part that holds another's mark is not searched.
+  // The template is scanned once, so that marks inside an inserted part are not replaced.
   std::string page;
   std::string_view rest = page_template();
   for (const auto& [mark, text] : parts) {

@@ -7,12 +7,12 @@
 
 namespace q3d::pipeline::report {
 
-// JSON that can stand inside <script type="application/json">: no text of it can end the element. Bytes that
-// are no UTF-8 become U+FFFD.
+// Returns JSON that is safe inside <script type="application/json">: no text in it can end the element. Bytes
+// that are not UTF-8 become U+FFFD.
 std::string script_json(const nlohmann::ordered_json& document);
 
-// The page. `pictures` is a list of galleries (report_galleries.h). Every text of the dataset is in the two
-// JSON elements alone, and the page's scripts set it as text.
+// Returns the page. `pictures` is a list of galleries (report_galleries.h). Texts of the dataset occur only
+// in the two JSON elements, and the page's scripts insert them as text.
 std::string report_html(const nlohmann::ordered_json& statistics, const nlohmann::ordered_json& pictures);
 
 }  // namespace q3d::pipeline::report

@@ -33,8 +33,8 @@ std::string text_of_file(const fs::path& file) {
   return fs::exists(file) ? manifests::read_file(file) : std::string();
 }
 
-// Returns a key of all that the two files depend on. Pictures and stage tables lie outside the dataset, but a
-// page that was made with them stays right.
+// Returns a key of everything on which the two files depend. Pictures and stage tables lie outside the
+// dataset and are not part of it, because a page that was made with them stays correct.
 std::string key_of(const dataset::PublishedDataset& dataset, const ReportOptions& options, bool has_bodies,
                    const std::string& tsne) {
   const dataset::DatasetManifest& manifest = dataset.manifest();
@@ -46,7 +46,7 @@ std::string key_of(const dataset::PublishedDataset& dataset, const ReportOptions
                                     std::string(page_explorer()) + std::string(page_further_charts()))));
 }
 
-// Whether an object has this text as a member. A damaged file may have a value of another type there.
+// Returns whether a member of the object is this text. A damaged file may have a value of another type there.
 bool says(const ordered_json& object, const char* member, const std::string& text) {
   return object.is_object() && object.value(member, ordered_json()) == text;
 }
@@ -63,7 +63,8 @@ bool is_up_to_date(const fs::path& folder, const std::string& key) {
   return true;
 }
 
-// t-SNE of the same labels, or null. A file of another dataset is said, since the user made it.
+// Returns the t-SNE of the same labels, or null. A file of another dataset is reported, because the user made
+// it.
 ordered_json tsne_of(const std::string& text, const dataset::DatasetManifest& manifest,
                      const fs::path& file) {
   if (text.empty()) return nullptr;
@@ -111,7 +112,7 @@ class ReportWriter {
     }
   }
 
-  // Adds a note to `numbers` where there are no meshes.
+  // Draws the galleries. Adds a note to `numbers` if there are no meshes.
   ordered_json galleries(const statistics::Facts& facts, ordered_json& numbers) const {
     std::vector<dataset::VerdictRow> rows;
     for (const statistics::CandidateFacts& candidate : facts.candidates) rows.push_back(candidate.row);
@@ -139,8 +140,8 @@ class ReportWriter {
   dataset::PublishedDataset dataset_;
   SourceFiles files_;
   const device::BodyMeshesLoader& load_bodies_;
-  fs::path body_;        // empty where none was found
-  std::string no_body_;  // why
+  fs::path body_;        // empty if none was found
+  std::string no_body_;  // the reason why no body was found
 };
 
 }  // namespace

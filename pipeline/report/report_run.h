@@ -1,4 +1,4 @@
-// `report`: statistics.json and report.html of a finished dataset.
+// `report`: writes statistics.json and report.html of a finished dataset.
 #pragma once
 
 #include <cstddef>
@@ -24,11 +24,11 @@ struct ReportSummary {
   bool was_up_to_date = false;
 };
 
-// Writes statistics.json, report.html and, last, manifest.json with their digests and the key of what they
-// were made from. If these are there and whole, nothing is made again. tsne.json in the folder
-// (tools/shape_tsne.py) is shown if it is of this dataset. Without a body model the galleries have no meshes,
-// and a note on the page says why. Throws std::runtime_error for a damaged dataset, manifests::IoError and
-// Interrupted.
+// Writes statistics.json, report.html and, last, manifest.json with their digests and the key of their
+// inputs. If these files exist and are undamaged, nothing is made again. The page shows tsne.json in the
+// folder (tools/shape_tsne.py) if it belongs to this dataset. Without a body model the galleries have no
+// meshes, and a note on the page says why. Throws std::runtime_error for a damaged dataset,
+// manifests::IoError and Interrupted.
 ReportSummary write_report(const ReportOptions& options, const device::BodyMeshesLoader& load_bodies);
 
 }  // namespace q3d::pipeline::report

@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Nothing if the file is gone or has other bytes than expected.
+// Returns nothing if the file is gone or its bytes differ from the expected digest.
 std::optional<std::vector<std::byte>> read_expected(const fs::path& path, const std::string& sha256) {
   loaders::pictures::FileBytes file = loaders::pictures::read_picture_file(path);
   if (file.failure != manifests::Reason::none || manifests::sha256(file.bytes) != sha256) return std::nullopt;

@@ -8,8 +8,8 @@
 namespace q3d::pipeline::run {
 namespace {
 
-// The first word of this process's command line. The network's program keeps the word that quadruped3d was
-// started with.
+// Returns the first word of this process's command line. quadruped3d-network keeps the word with which
+// quadruped3d was started.
 std::string started_as() {
   constexpr const char* kUsual = "quadruped3d";
   std::ifstream words("/proc/self/cmdline", std::ios::binary);

@@ -1,4 +1,4 @@
-// Command lines that a user can paste into a shell as they are printed.
+// Formats command lines that a user can paste into a shell.
 #pragma once
 
 #include <string>

@@ -18,7 +18,7 @@ void leave_at_once(int) {
   _exit(interrupt_exit_code());
 }
 
-// Async-signal-safe: write, alarm and _exit only.
+// The handler must be async-signal-safe, so it calls only write, alarm and _exit.
 void on_signal(int number) {
   if (first_signal != 0) _exit(interrupt_exit_code());
   first_signal = number;
@@ -42,7 +42,7 @@ void install_interrupt_handlers() {
   struct sigaction last {};
   last.sa_handler = leave_at_once;
   sigaction(SIGALRM, &last, nullptr);
-  // A quota that is reached should fail the write, with a message, and not end the process.
+  // A file size limit that is reached should fail the write, with a message, and not end the process.
   std::signal(SIGXFSZ, SIG_IGN);
 }
 

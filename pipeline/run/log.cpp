@@ -7,7 +7,7 @@ namespace q3d::pipeline::run {
 namespace {
 
 struct Log {
-  std::mutex mutex;  // guards the rest, and keeps calls of the sink apart
+  std::mutex mutex;  // guards the other variables and serialises calls of the sink
   LogSink* sink = nullptr;
 };
 

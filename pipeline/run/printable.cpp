@@ -61,7 +61,7 @@ void draw_terminal_line(std::string_view line) {
   if (!terminal_of_stderr().redraws) return;
   const std::string drawn = "\r\033[K" + std::string(line);
   const ssize_t written = write(STDERR_FILENO, drawn.data(), drawn.size());
-  static_cast<void>(written);  // a terminal that is gone shows nothing
+  static_cast<void>(written);  // a failure means that the terminal is gone
 }
 
 void erase_terminal_line() {

@@ -48,7 +48,7 @@ void Progress::count(std::int64_t count, bool from_earlier_run) {
 void Progress::draw_in_time() {
   if (quiet_ || state_.done >= state_.total) return;
   const double since_s = std::chrono::duration<double>(Clock::now() - drawn_).count();
-  // On a terminal the first line comes at once, so that a user sees what the program is at.
+  // On a terminal the first line is drawn at once, so that a user sees what the program is doing.
   if ((terminal_ && !has_drawn_) || since_s >= (terminal_ ? kRedrawAfter_s : kLineAfter_s)) draw(false);
 }
 

@@ -1,4 +1,4 @@
-// Progress of long work on stderr: a bar that redraws itself on a terminal, plain lines now and then
+// Shows the progress of long work on stderr: a bar that is redrawn on a terminal, and occasional plain lines
 // elsewhere.
 #pragma once
 
@@ -21,8 +21,8 @@ class Progress {
   Progress& operator=(const Progress&) = delete;
 
   void advance(std::int64_t count, bool from_earlier_run = false);
-  // The same, and tells `details` behind the numbers from now on. `count` may be 0 or negative: work that was
-  // counted too early is taken back.
+  // Advances, and shows `details` after the numbers from now on. `count` may be 0, or negative to take back
+  // work that was counted too early.
   void advance(std::int64_t count, bool from_earlier_run, std::string details);
 
  private:

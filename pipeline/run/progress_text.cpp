@@ -8,7 +8,7 @@
 namespace q3d::pipeline::run {
 namespace {
 
-constexpr int kMostCells = 24;  // of the bar
+constexpr int kMostCells = 24;  // cells of the bar
 constexpr int kLeastCells = 8;
 constexpr const char* kBlue = "\033[34m";
 constexpr const char* kPlain = "\033[0m";
@@ -17,7 +17,7 @@ std::int64_t percent(const ProgressState& state) {
   return state.total > 0 ? 100 * state.done / state.total : 100;
 }
 
-// The rate and the time, each after `separator`.
+// Returns the rate and the time, each after `separator`.
 std::string times(const ProgressState& state, const char* separator) {
   std::string text;
   if (state.per_second > 0) text += fmt::format("{}{:.1f}/s", separator, state.per_second);

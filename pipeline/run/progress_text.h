@@ -1,4 +1,4 @@
-// How progress is written, without a clock or a terminal.
+// Formats progress, without a clock or a terminal.
 #pragma once
 
 #include <cstdint>
@@ -6,7 +6,7 @@
 
 namespace q3d::pipeline::run {
 
-// "41 s", "12 min 05 s", "3 h 20 min".
+// Returns "41 s", "12 min 05 s" or "3 h 20 min".
 std::string human_duration(double seconds);
 
 struct ProgressState {
@@ -15,14 +15,15 @@ struct ProgressState {
   std::int64_t total = 0;
   double per_second = 0.0;  // 0 = not known yet
   double elapsed_s = 0.0;
-  std::string details{};  // what else there is to tell; may be empty
-  bool is_last = false;   // the elapsed time is told instead of the time left
+  std::string details{};  // further text; may be empty
+  bool is_last = false;   // shows the elapsed time instead of the time left
 };
 
-// A line for files and pipes: "candidates: 12 / 96 (12 %), 3.4/s, 24 s left; DETAILS".
+// Returns a line for files and pipes: "candidates: 12 / 96 (12 %), 3.4/s, 24 s left; DETAILS".
 std::string progress_line(const ProgressState& state);
 
-// A line for a terminal, with a bar, of less than `columns` characters; what is too long is cut at the end.
+// Returns a line for a terminal, with a bar, of less than `columns` characters. A longer line is cut at the
+// end.
 std::string progress_bar(const ProgressState& state, int columns, bool has_colour);
 
 }  // namespace q3d::pipeline::run

@@ -1,4 +1,4 @@
-// What stderr can show: a line that is drawn again in place, and colours.
+// The abilities of the terminal at stderr: to redraw a line in place, and to show colours.
 #pragma once
 
 namespace q3d::pipeline::run {
@@ -9,7 +9,7 @@ struct Terminal {
   int columns = 80;         // its width
 };
 
-// Asks anew at each call, since a window may change its width.
+// Returns the current abilities. A window may change its width, so call it each time.
 Terminal terminal_of_stderr();
 
 }  // namespace q3d::pipeline::run

@@ -1,4 +1,4 @@
-// Plurals in messages.
+// Makes plurals in messages.
 #pragma once
 
 #include <cstdint>

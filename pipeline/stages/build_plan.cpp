@@ -26,7 +26,7 @@ using nlohmann::json;
 using nlohmann::ordered_json;
 
 constexpr const char* kFormat = "quadruped3d-build-plan";
-constexpr std::size_t kMembers = 7;  // of the document, without its digest
+constexpr std::size_t kMembers = 7;  // members of the document without its digest
 
 ordered_json stages_json(const BuildPlan& plan) {
   ordered_json stages = ordered_json::object();
@@ -61,15 +61,15 @@ std::string text_of(const BuildPlan& plan) {
   return manifests::seal_json(document);
 }
 
-// Names and keys become parts of paths.
+// Checks a name or key, because these become parts of paths.
 std::string name_in(const json& value) {
   auto name = value.get<std::string>();
   if (manifests::is_file_name(name)) return name;
   throw std::runtime_error(fmt::format("got {}, expected a name or a key", value.dump()));
 }
 
-// Throws json::exception when something is missing or of another type, and std::runtime_error for a name or
-// a number that cannot be one.
+// Reads a plan. Throws json::exception if a member is missing or has another type, and std::runtime_error for
+// an impossible name or number.
 BuildPlan plan_from(const json& document) {
   BuildPlan plan;
   plan.name = name_in(document.at("name"));
@@ -89,14 +89,14 @@ BuildPlan plan_from(const json& document) {
   return plan;
 }
 
-// A plan, or what is wrong with its file.
+// A plan, or the problem with its file.
 struct PlanFile {
   fs::path file;
   std::optional<BuildPlan> plan;
   std::string problem;
 };
 
-// A plan of an earlier version has no digest.
+// Reads a plan. One of an earlier version has no digest.
 PlanFile parse_plan(const fs::path& file, const manifests::SealedDocument& sealed) {
   const json document = sealed.document;
   if (document.value("format", json()) != kFormat) return {file, {}, "it holds no build plan"};
@@ -116,7 +116,7 @@ PlanFile read_plan(const fs::path& file) {
   try {
     return parse_plan(file, manifests::read_sealed_json(file));
   } catch (const manifests::DamagedDocument& error) {
-    const std::string name = file.string() + ": ";  // with which that error begins
+    const std::string name = file.string() + ": ";  // the error begins with this prefix
     return {file, {}, std::string(error.what()).substr(name.size())};
   }
 }

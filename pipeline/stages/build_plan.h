@@ -1,8 +1,8 @@
-// What a build is going to make: its units and the keys of its stages.
+// A plan says what a build will make: its units and the keys of its stages.
 //
-// A build writes its plan as soon as the candidates are read, to <out>/stages/builds/<name>-<key>.json. With
-// it, others can say how far the build has come (`status`), and why a later build makes a stage anew
-// (`build --dry-run`). No result depends on a plan, and it is no part of a dataset.
+// A build writes its plan as soon as the candidates are read, to <out>/stages/builds/<name>-<key>.json.
+// `status` uses it to show how far the build has come, and `build --dry-run` to say why a later build makes a
+// stage anew. No result depends on a plan, and it is no part of a dataset.
 #pragma once
 
 #include <cstdint>
@@ -27,29 +27,29 @@ struct BuildPlan {
   std::int64_t candidates = 0;
   std::vector<PlannedUnit> units;
   StageKeys keys;
-  std::map<std::string, std::string> made_from;  // as of made_from.h
+  std::map<std::string, std::string> made_from;  // the texts of made_from.h
   std::vector<std::string>
       command;  // the words after the program's name, as the user gave them; may be empty
 };
 
-// "<name>-<first 12 hex digits of the dataset's key>": the name of a version's folder.
+// Returns the name of a version's folder: "<name>-<first 12 hex digits of the dataset's key>".
 std::string version_name(const std::string& name, const StageKeys& keys);
 
 BuildPlan plan_of(const config::BuildConfig& config, const config::JudgingRules& rules,
                   const candidates::Ingest& ingest, const AssetDigests& assets, const std::string& device_key,
                   std::vector<std::string> command);
 
-// The folder of the plans. The other folders beside it are those of stages.
+// Returns the folder of the plans. The other folders beside it belong to stages.
 std::filesystem::path plans_folder(const std::filesystem::path& out);
 
-// The path of a version's plan.
+// Returns the path of a version's plan.
 std::filesystem::path plan_file(const std::filesystem::path& out, const std::string& version);
 
-// Writes the plan, unless its file holds it already. Throws manifests::IoError.
+// Writes the plan, unless the file already holds it. Throws manifests::IoError.
 void write_build_plan(const std::filesystem::path& out, const BuildPlan& plan);
 
-// All plans in an output folder, in the order of their files' names. A file that holds no plan is left out,
-// and a warning names it. Throws manifests::IoError.
+// Returns all plans in an output folder, sorted by file name. A file that holds no plan is left out, and a
+// warning names it. Throws manifests::IoError.
 std::vector<BuildPlan> read_build_plans(const std::filesystem::path& out);
 
 struct DamagedPlan {
@@ -57,7 +57,7 @@ struct DamagedPlan {
   std::string problem;  // what was found and what was expected
 };
 
-// The plans' files that read_build_plans would leave out. Throws manifests::IoError.
+// Returns the files that read_build_plans() would leave out. Throws manifests::IoError.
 std::vector<DamagedPlan> find_damaged_plans(const std::filesystem::path& out);
 
 }  // namespace q3d::pipeline::stages

@@ -1,4 +1,4 @@
-// The inputs of each stage of a build, as the texts whose digests are the stages' keys.
+// Returns the inputs of each stage of a build, as the texts whose digests are the stages' keys.
 #pragma once
 
 #include <map>

@@ -15,7 +15,7 @@ using nlohmann::json;
 
 constexpr std::size_t kDigestDigits = 64;
 
-// A value for people: a digest by its first digits, an absent value as "nothing".
+// Formats a value for people: a digest by its first digits, an absent value as "nothing".
 std::string shown(const json& value) {
   if (value.is_null()) return "nothing";
   if (value.is_string()) {
@@ -29,7 +29,7 @@ json parts_of(const BuildPlan& plan, Stage stage) {
   return json::parse(plan.made_from.at(std::string(to_string(stage))));
 }
 
-// Goes through the members of two objects, and of the objects in them.
+// Compares the members of two objects recursively.
 void compare(const json& before, const json& after, const std::string& prefix,
              std::vector<std::string>& list) {
   std::set<std::string> names;

@@ -20,18 +20,20 @@ std::string_view to_string(Stage stage);
 Stage stage_from_string(std::string_view name);   // throws std::invalid_argument on an unknown name
 std::span<const std::string_view> stage_names();  // in the order of the enumerators
 
-// Whether the stage has a folder with a file for each unit. `ingest` has the build's plan (build_plan.h), and
-// what `fidelity` gives is computed again in every build.
+// Returns whether the stage has a folder with a file for each unit. `ingest` has the build's plan
+// (build_plan.h) instead, and every build computes the results of `fidelity` again.
 constexpr bool has_folder(Stage stage) {
   return stage != Stage::ingest && stage != Stage::fidelity;
 }
 
-// Whether a unit's file depends on what is left out and on the datasets' terms, beside the unit's input.
+// Returns whether a unit's file depends on exclusions and on the datasets' terms, in addition to the unit's
+// input.
 constexpr bool depends_on_labels(Stage stage) {
   return stage == Stage::measure || stage == Stage::shards;
 }
 
-// Empty for `measure` in a build without pseudo labels, and where dataset.json does not state the key.
+// Returns the key of a stage. It is empty for `measure` in a build without pseudo labels, and if dataset.json
+// does not state it.
 const std::string& key_of(const StageKeys& keys, Stage stage);
 std::string& key_of(StageKeys& keys, Stage stage);
 

@@ -28,7 +28,7 @@ std::vector<fs::path> stage_folders(const fs::path& out) {
   return folders;
 }
 
-// Nothing if there is no such file.
+// Returns nothing if there is no such file.
 std::optional<std::string> digest_if_present(const fs::path& file) {
   try {
     return manifests::sha256_file(file);

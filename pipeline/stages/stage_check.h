@@ -1,4 +1,4 @@
-// Compares what lies in the stages' folders with their journals, without changing anything.
+// Compares the files in the stages' folders with their journals, without changing anything.
 #pragma once
 
 #include <cstdint>
@@ -15,13 +15,13 @@ struct StageProblem {
 };
 
 struct StageCheck {
-  std::int64_t files = 0;  // units' files that were read
+  std::int64_t files = 0;  // number of units' files that were read
   std::vector<StageProblem> problems;
 };
 
 // Reads every unit's file that a journal in <out>/stages names, the journals themselves, the manifests and
-// the builds' plans. A file without a journal line is no problem: a killed run left it, and no build uses it.
-// The result is empty if there are no stages. Throws manifests::IoError and Interrupted.
+// the builds' plans. A file without a journal line is no problem, because a killed run left it and no build
+// uses it. The result is empty if there are no stages. Throws manifests::IoError and Interrupted.
 StageCheck check_stages(const std::filesystem::path& out);
 
 }  // namespace q3d::pipeline::stages

@@ -53,7 +53,7 @@ void StageStore::take_over(const std::vector<std::filesystem::path>& files) {
 }
 
 void StageStore::take_over_ranks() {
-  // The journals are found by their names, because a network file system may not list new files yet.
+  // The journals are opened by name, because a network file system may not list new files yet.
   std::vector<std::filesystem::path> files;
   for (int rank = 1; rank < rank_.ranks; ++rank) {
     std::filesystem::path file = rank_journal(folder_, rank_.run, rank);
@@ -71,7 +71,7 @@ std::filesystem::path StageStore::file(const candidates::Unit& unit) const {
   return unit_file(folder_, unit.index);
 }
 
-// Returns what the journal says of the unit, if its file is there with the right size.
+// Returns the unit's journal entry, if its file exists with the right size.
 std::optional<manifests::JournalEntry> StageStore::claimed(const candidates::Unit& unit) {
   std::optional<manifests::JournalEntry> entry;
   {

@@ -1,4 +1,4 @@
-// A stage's folder for readers that change nothing in it, such as `status` and `build --dry-run`.
+// Reads a stage's folder without changing it, for `status` and `build --dry-run`.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ enum class UnitState : std::uint8_t {
   damaged,      // its file is gone, or is not the one that the journal names
 };
 
-// Whether a unit's file is compared with the journal by its size or byte for byte.
+// Says whether a unit's file is compared with the journal by its size or by its bytes.
 enum class Comparison : std::uint8_t { sizes, bytes };
 
 class StageView {
@@ -29,8 +29,9 @@ class StageView {
   std::filesystem::path manifest() const { return folder_ / "manifest.json"; }
   bool exists() const;
 
-  // Without a digest, the unit may have been made from any input. With Comparison::bytes the file is read
-  // whole; throws manifests::IoError when it is there and cannot be read.
+  // Returns the state of a unit. Without a digest, the unit may have been made from any input. With
+  // Comparison::bytes the whole file is read, and manifests::IoError is thrown if it exists and cannot be
+  // read.
   UnitState state(std::int64_t unit, const std::optional<std::string>& digest, Comparison comparison) const;
 
   const manifests::Journal& journal() const { return journal_; }

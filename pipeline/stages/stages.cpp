@@ -24,7 +24,7 @@ namespace {
 
 using nlohmann::json;
 
-// Raise a number when a change of the code changes what the stage writes.
+// Raise a stage's number when a change of the code changes its output.
 constexpr int kIngestCode = 3;
 constexpr int kPredictCode = 5;
 constexpr int kFidelityCode = 2;
@@ -33,7 +33,7 @@ constexpr int kMeasureCode = 2;
 constexpr int kCropsCode = 1;
 constexpr int kShardsCode = 2;
 
-// The text whose SHA-256 is the stage's key. nlohmann sorts the keys, so it is canonical.
+// Returns the text whose SHA-256 is the stage's key. nlohmann::json sorts the keys, so the text is canonical.
 std::string key_text(const char* stage, int code, json parts) {
   parts["stage"] = stage;
   parts["code"] = code;
@@ -64,7 +64,7 @@ json thresholds_json(const filters::Thresholds& thresholds) {
           {"gain_window", thresholds.gain_window}};
 }
 
-// Common thresholds count the same whether they were given for all datasets or for each of them.
+// Returns the thresholds in one form, whether they were given for all datasets or for each of them.
 json fidelity_parts(const config::JudgingRules& rules) {
   const filters::Thresholds& first = rules.thresholds.begin()->second;
   const bool are_common = std::all_of(rules.thresholds.begin(), rules.thresholds.end(),
@@ -119,7 +119,7 @@ std::string crops_text(const config::ShardConfig& shards) {
   return key_text("crops", kCropsCode, std::move(parts));
 }
 
-// The keys with the texts that they are digests of, by the stages' names.
+// The keys, and the texts of which they are digests, by the stages' names.
 struct Recipes {
   StageKeys keys;
   std::map<std::string, std::string> texts;
@@ -210,8 +210,8 @@ std::map<std::string, std::string> made_from(const config::BuildConfig& config,
 std::optional<std::string> key_in_manifest(const std::filesystem::path& file) {
   try {
     const auto [manifest, has_digest] = manifests::read_sealed_json(file);
-    // A manifest of an earlier version has no digest, and nothing but these two. One that has more has lost
-    // it.
+    // A manifest of an earlier version has no digest and only these two members. One with more members and no
+    // digest is damaged.
     constexpr std::size_t kMembers = 2;
     if (!has_digest && manifest.size() != kMembers) return std::nullopt;
     const auto found = manifest.find("key");
@@ -246,7 +246,7 @@ void open_stage_folder(const std::filesystem::path& folder, const std::string& s
                                  manifest.string(), key));
   }
   manifests::write_file_atomically(manifest, manifests::seal_json({{"stage", stage}, {"key", key}}));
-  // The names of the folders that were made, up to the one that the user gave.
+  // Make the names of the new folders durable, up to the folder that the user gave.
   manifests::sync_folder(folder.parent_path());
   manifests::sync_folder(folder.parent_path().parent_path());
 }

@@ -11,7 +11,8 @@ namespace {
 
 using nlohmann::ordered_json;
 
-// Shares of the crop's side. Beyond a fifth nearly every keypoint of a usable body is within.
+// Thresholds are fractions of the crop's side. They end at a fifth, within which nearly every keypoint of a
+// usable body lies.
 constexpr int kSteps = 40;
 constexpr double kLastThreshold = 0.2;
 
@@ -19,7 +20,7 @@ double threshold(int step) {
   return kLastThreshold * step / kSteps;
 }
 
-// Means over samples.
+// Accumulates means over samples.
 class Curve {
  public:
   void add(const Fit& fit) {

@@ -13,7 +13,7 @@ namespace {
 using manifests::Reason;
 using nlohmann::ordered_json;
 
-// Gives each name its number in the order of first use.
+// Numbers names in the order of first use.
 class Names {
  public:
   std::size_t number(const std::string& name) {
@@ -32,12 +32,13 @@ std::string species_of(const dataset::VerdictRow& row) {
   return row.species.empty() ? "unknown" : row.species;
 }
 
-// Neither threshold lets these in.
+// Returns whether a candidate with this reason stays out whatever the thresholds are.
 bool is_fixed(Reason reason) {
   return reason == Reason::vetoed || reason == Reason::in_test_split || reason == Reason::too_few_keypoints;
 }
 
-// A guard is on where one of its numbers is not 0. `held_out_seed` alone does nothing.
+// Returns whether any guard is on. A guard is on if one of its numbers is not 0; `held_out_seed` alone has no
+// effect, and candidates below `visible_min` are fixed anyway (is_fixed).
 bool is_guarded(const ordered_json& document) {
   if (!document.contains("guards") || !document["guards"].is_object()) return false;
   for (const auto& [name, value] : document["guards"].items()) {
@@ -80,7 +81,7 @@ ordered_json thresholds_json(const dataset::DatasetManifest& manifest) {
 ordered_json explorer(const Facts& facts, const dataset::DatasetManifest& manifest,
                       const ordered_json& document) {
   Names datasets, species;
-  std::map<std::string, std::pair<std::int64_t, std::int64_t>> others;  // candidates and kept
+  std::map<std::string, std::pair<std::int64_t, std::int64_t>> others;  // candidates and kept ones
   ordered_json columns = ordered_json::object();
   bool has_trust = false;
   constexpr const char* kColumns[] = {"dataset",    "group",          "error",      "gain",

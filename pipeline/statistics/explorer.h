@@ -1,4 +1,5 @@
-// The page's threshold explorer needs these numbers to judge every candidate again under other thresholds.
+// Makes the numbers with which the page's threshold explorer judges every candidate again under other
+// thresholds.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -8,7 +9,8 @@
 
 namespace q3d::pipeline::statistics {
 
-// The judged candidates of role pseudo, column by column, and what stays as it is whatever the thresholds:
+// Returns the judged candidates of role pseudo, column by column, and the results that do not depend on the
+// thresholds:
 //   thresholds  {dataset: {tau_low, tau_high, delta}}
 //   rule        {iterations_min, iterations_max, gain_window, refine_retained, min_trust, guarded}; guarded:
 //   a
@@ -20,7 +22,7 @@ namespace q3d::pipeline::statistics {
 //   thresholds: vetoed, in a test set, too few keypoints), trust (combined, null: not measured; absent where
 //   no label has one)
 //   others      {candidates, kept} by species name: failed ones, and those that bring their labels
-// Null where no candidate was judged. `document` is dataset.json.
+// The result is null if no candidate was judged. `document` is dataset.json.
 nlohmann::ordered_json explorer(const Facts& facts, const dataset::DatasetManifest& manifest,
                                 const nlohmann::ordered_json& document);
 

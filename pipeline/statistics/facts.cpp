@@ -19,7 +19,7 @@ namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
-// Nothing where the body has no projection or no keypoint is visible.
+// Returns nothing if the body has no projection or no keypoint is visible.
 std::optional<Fit> fit_of(const smal::CropPoints& projected, const smal::CropKeypoints& annotated) {
   if (!unit::has_projection(projected)) return std::nullopt;
   const auto area = filters::auc(projected, annotated, smal::kCropSidePx);
@@ -107,10 +107,10 @@ class Gatherer {
     facts.betas = label.betas;
   }
 
-  // The shards of a version that was made from others hold other candidates than its units, so the verdicts
-  // say where a label lies.
+  // Reads labels from the shards, at the places that the verdicts state. In a version that was made from
+  // others, the candidates of a shard are not those of the unit with its number.
   void read_shards(std::span<CandidateFacts> candidates) {
-    std::optional<manifests::ShardReader> shard;  // opened when a row of it is wanted
+    std::optional<manifests::ShardReader> shard;  // opened when one of its rows is needed
     std::int64_t opened = 0;
     for (CandidateFacts& facts : candidates) {
       if (!facts.row.label) continue;

@@ -1,4 +1,4 @@
-// Gathers what is known of each candidate of a finished dataset, once for all statistics.
+// Gathers the facts about each candidate of a finished dataset, once for all statistics.
 #pragma once
 
 #include <array>
@@ -24,24 +24,24 @@ struct CandidateFacts {
   dataset::VerdictRow row;
   config::Role role = config::Role::pseudo;
 
-  // Nothing of what follows is known where the unit's tables are gone and the candidate was not kept.
+  // The facts below are unknown if the unit's tables are gone and the candidate was not kept.
   bool has_geometry = false;
   int visible = 0;  // keypoints
   double box_w_px = 0.0, box_h_px = 0.0;
-  int image_w_px = 0, image_h_px = 0;  // 0 where the picture could not be read
+  int image_w_px = 0, image_h_px = 0;  // 0 if the picture could not be read
 
-  std::optional<Fit> prediction;     // of role pseudo
-  std::optional<Fit> label;          // of the kept ones whose body has a projection
-  std::optional<smal::Betas> betas;  // of the kept ones with a shape
+  std::optional<Fit> prediction;     // for role pseudo
+  std::optional<Fit> label;          // for kept candidates whose body has a projection
+  std::optional<smal::Betas> betas;  // for kept candidates with a shape
 };
 
 struct Facts {
   std::vector<CandidateFacts> candidates;  // in ingest order
-  std::vector<std::string> missing;        // what could not be found, for people
+  std::vector<std::string> missing;        // things that could not be found, for people
 };
 
-// Reads verdicts.csv, the tables of predict and refine, and of kept candidates whose tables are gone, the
-// shards. Throws std::runtime_error for a file that is damaged, and Interrupted.
+// Reads verdicts.csv, the tables of predict and refine, and the shards for kept candidates whose tables are
+// gone. Throws std::runtime_error for a file that is damaged, and Interrupted.
 Facts gather(const dataset::PublishedDataset& dataset);
 
 }  // namespace q3d::pipeline::statistics

@@ -66,7 +66,7 @@ double ratio(std::int64_t part, std::int64_t whole) {
   return whole == 0 ? 0.0 : static_cast<double>(part) / static_cast<double>(whole);
 }
 
-// Largest first; of equal size, by name.
+// Returns the groups, largest first; groups of equal size are sorted by name.
 ordered_json list_of(const Groups& groups, const dataset::Counts& all) {
   std::vector<const Groups::value_type*> order;
   for (const auto& group : groups) order.push_back(&group);
@@ -94,7 +94,7 @@ ordered_json list_of(const Groups& groups, const dataset::Counts& all) {
   return list;
 }
 
-// Groups of unknown name say nothing of an imbalance.
+// Returns the imbalance. The group of unknown names is not used for it.
 ordered_json imbalance(const Groups& groups, const std::string& unnamed) {
   const auto of = [&](const std::function<std::int64_t(const Group&)>& count) -> ordered_json {
     std::int64_t largest = 0, smallest = 0, lost = 0;

@@ -1,4 +1,4 @@
-// Counts how many candidates went in and how many labels came out, by what they show.
+// Counts candidates and labels by dataset, family and species.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -8,13 +8,14 @@
 
 namespace q3d::pipeline::statistics {
 
-// The way of all candidates to the kept ones: [{step, count, meaning}], from all to kept.
+// Returns how many candidates remain after each step, from all to the kept ones: [{step, count, meaning}].
 nlohmann::ordered_json funnel(const Facts& facts);
 
-// [{reason, verdict, count, meaning}] of the discarded and failed, largest first.
+// Returns [{reason, verdict, count, meaning}] of the discarded and failed candidates, largest first.
 nlohmann::ordered_json reasons(const Facts& facts);
 
-// {species: [...], families: [...], datasets: [...], imbalance: {...}}. Each entry of a list, largest first:
+// Returns {species: [...], families: [...], datasets: [...], imbalance: {...}}. Each entry of a list, largest
+// first:
 //   name, family (of a species, that of most of its candidates), candidates, retained, refined, discarded,
 //   failed, kept, yield {share, low, high} (kept of candidates, 95 % interval), share_before, share_after (of
 //   all candidates, and of all kept), mean_error_before, mean_error_after (of the kept, L_proj)

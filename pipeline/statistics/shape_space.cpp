@@ -19,7 +19,7 @@ using smal::Betas;
 constexpr int kClusters = 5;
 constexpr std::uint64_t kSeed = 0;
 
-// Null where the labels are too few, or of one family only: the index then says nothing.
+// Returns null if the labels are too few or belong to one family, because the index is then meaningless.
 ordered_json family_agreement(const std::vector<const CandidateFacts*>& labels) {
   std::vector<float> points;
   std::vector<int> families;

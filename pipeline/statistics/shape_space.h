@@ -12,15 +12,15 @@ namespace q3d::pipeline::statistics {
 // same picture on every machine.
 struct PrincipalComponents {
   std::array<double, 2> explained{};
-  std::vector<std::array<double, 2>> scores;  // of every point, in order
+  std::vector<std::array<double, 2>> scores;  // scores of every point, in order
 };
 // Throws std::invalid_argument for fewer than 3 points.
 PrincipalComponents principal_components(const std::vector<smal::Betas>& points);
 
-// {labels, shown, explained: [2], x: [...], y, family: [names], species:
-// [...], id: [...], ari: {value, clusters, seed, labels} of k-means on all betas against the families (of the
-// labels whose family is known)}. At most `most` points are shown, evenly spread; all numbers are of all
-// labels. Null with fewer than 3 labels that have a shape.
+// {labels, shown, explained: [2], x: [...], y, family: [names], species: [...], id: [...], ari: {value,
+// clusters, seed, labels} of k-means on all betas against the families (of the labels whose family is
+// known)}. At most `most` points are shown, evenly spread; all other numbers cover all labels. The result is
+// null with fewer than 3 labels that have a shape.
 nlohmann::ordered_json shape_space(const Facts& facts, std::size_t most = 2500);
 
 }  // namespace q3d::pipeline::statistics

@@ -11,7 +11,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-// Adds what dataset.json itself says to people who read the page. Older datasets lack it.
+// Adds the texts for people that dataset.json itself holds. Older datasets lack them.
 void add_said(const ordered_json& document, const char* key, ordered_json& list) {
   if (!document.contains(key) || !document[key].is_array()) return;
   for (const ordered_json& line : document[key]) list.push_back(line);

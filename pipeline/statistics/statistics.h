@@ -1,4 +1,4 @@
-// statistics.json: everything that the report shows in numbers.
+// Makes statistics.json, which holds all numbers that the report shows.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -10,10 +10,10 @@ namespace q3d::pipeline::statistics {
 inline constexpr const char* kStatisticsFormat = "quadruped3d-statistics";
 inline constexpr int kStatisticsSchema = 1;
 
-// The document: format, schema, dataset {...}, counts, labels, funnel, reasons, groups, errors, adaptation,
-// accuracy, keypoints, visible, sizes, trust, shape, explorer, notes, provenance. docs/report.md explains
-// each part. No time, host or path of its own: equal datasets give equal bytes. Throws like gather, and
-// std::runtime_error for a dataset.json that is damaged.
+// Returns the document: format, schema, dataset {...}, counts, labels, funnel, reasons, groups, errors,
+// adaptation, accuracy, keypoints, visible, sizes, trust, shape, explorer, notes, provenance. docs/report.md
+// explains each part. It adds no time, host or path, so equal datasets give equal bytes. Throws like gather,
+// and std::runtime_error for a dataset.json that is damaged.
 nlohmann::ordered_json statistics(const dataset::PublishedDataset& dataset, const Facts& facts);
 
 }  // namespace q3d::pipeline::statistics

@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 using stages::Stage;
 using stages::UnitState;
 
-// The digests of a build's units where its plan is known; otherwise their number alone.
+// The digests of a build's units if its plan is known; otherwise only their number.
 struct Units {
   std::int64_t count = 0;
   const std::vector<stages::PlannedUnit>* planned = nullptr;
@@ -32,7 +32,7 @@ struct Units {
   }
 };
 
-// The units of one stage that has a folder.
+// Returns the state of the units of one stage that has a folder.
 StageStatus folder_stage(const fs::path& out, Stage stage, const std::string& key, const Units& units) {
   const stages::StageView view(out, std::string(to_string(stage)), key);
   StageStatus status;
@@ -52,7 +52,7 @@ StageStatus folder_stage(const fs::path& out, Stage stage, const std::string& ke
   return status;
 }
 
-// A unit needs no table of stored crops once it has its shard, which holds them.
+// Counts units without a table of stored crops as not needed if they have their shard, which holds the crops.
 void excuse_crops(StageStatus& crops, const StageStatus& shards) {
   const auto has_shard = [&](std::int64_t unit) {
     return !std::binary_search(shards.missing.begin(), shards.missing.end(), unit);
@@ -97,7 +97,8 @@ void find_results(const fs::path& out, BuildStatus& build) {
   build.is_latest = fs::read_symlink(out / "latest", error) == build.version;
 }
 
-// A version without a plan: it was built before there were plans, or it was made from other versions.
+// Returns the status of a version without a plan, which was built before plans existed or was made from other
+// versions.
 BuildStatus published_status(const fs::path& out, const std::string& version) {
   const dataset::DatasetManifest manifest = dataset::read_dataset_manifest(out / version);
   BuildStatus build;

@@ -23,7 +23,7 @@ std::string short_key(const std::string& key) {
   return key.substr(0, stages::kShortKey);
 }
 
-// "unit 3 is", "units 0 to 5, 8 and 11 are"; far-flung units are cut short.
+// Returns "unit 3 is" or "units 0 to 5, 8 and 11 are". A list of many ranges is cut short.
 std::string units_are(const std::vector<std::int64_t>& units) {
   std::vector<std::string> ranges;
   for (std::size_t first = 0; first < units.size();) {
@@ -44,7 +44,7 @@ std::string units_are(const std::vector<std::int64_t>& units) {
   return units.size() == 1 ? fmt::format("unit {} is", text) : fmt::format("units {} are", text);
 }
 
-// A remark on a stage, beside its numbers.
+// Returns a remark on a stage that follows its numbers.
 std::string remark(const StageStatus& stage) {
   if (stage.stage == Stage::fidelity) return "has no file; every build computes it again";
   if (stage.stage == Stage::ingest) {
@@ -104,7 +104,7 @@ std::string remark(const dataset::ExportStatus& status) {
   return {};
 }
 
-// The exports of one version, a line each.
+// Returns one line for each export of a version.
 std::string export_lines(const std::vector<dataset::ExportStatus>& exports, const std::string& version) {
   std::string text;
   for (const dataset::ExportStatus& each : exports) {

@@ -1,4 +1,4 @@
-// The status of an output folder as text and as JSON.
+// Writes the status of an output folder as text and as JSON.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -9,10 +9,11 @@
 
 namespace q3d::pipeline::status {
 
-// A table of the build's stages, a line each, with what is missing. Every line begins with `indent`.
+// Returns a table with one line for each stage of the build, with its missing units. Every line begins with
+// `indent`.
 std::string stage_table(const BuildStatus& build, const std::string& indent);
 
-// The whole folder, for people.
+// Returns the status of the whole folder for people.
 std::string page(const FolderStatus& status);
 
 nlohmann::ordered_json to_json(const BuildStatus& build);

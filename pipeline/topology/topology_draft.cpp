@@ -21,7 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 using manifests::SampleRecord;
 
-// The folder that holds the labels.
+// Returns the folder that holds the labels.
 fs::path folder_of(const fs::path& labels) {
   const fs::path absolute = fs::absolute(labels).lexically_normal();
   return fs::is_directory(absolute) ? absolute : absolute.parent_path();
@@ -71,7 +71,7 @@ Draft draft_topology(const DraftOptions& options) {
                     options.out.string()));
   }
   Draft draft{loaders::formats::survey_labels(options.from), {}, {}};
-  // A project of DeepLabCut has its pictures where its labels say.
+  // The labels of a DeepLabCut project name the places of its pictures.
   if (!fs::is_directory(options.from)) draft.images = folder_of_most_pictures(options.from);
   const std::string name = options.name.empty() ? draft.survey.file.stem().string() : options.name;
   draft.guess = loaders::keypoints::guess_topology(name, draft.survey.names);

@@ -1,4 +1,4 @@
-// `topology`: a first topology for a lab's labels, and a picture to check it by.
+// `topology`: drafts a topology for a lab's labels, and draws a picture with which people check it.
 #pragma once
 
 #include <filesystem>
@@ -13,9 +13,9 @@ namespace q3d::pipeline::topology {
 
 struct DraftOptions {
   std::filesystem::path from;  // a label file, or a folder of labels (survey_labels)
-  std::string name;            // of the topology; empty takes the file's
+  std::string name;            // name of the topology; empty takes the file's
   std::filesystem::path out;   // the topology file to write; empty writes none
-  bool replaces = false;       // whether a file that is there may be written over
+  bool replaces = false;       // whether an existing file may be overwritten
 };
 
 struct Draft {
@@ -26,8 +26,8 @@ struct Draft {
   std::filesystem::path images{};
 };
 
-// Reads the names of the keypoints, guesses a topology and writes it. Throws ConfigError if the file to write
-// is there already and may not be written over, before anything is read, and like survey_labels.
+// Reads the names of the keypoints, guesses a topology and writes it. Throws ConfigError, before anything is
+// read, if the file to write exists and may not be overwritten. Also throws as survey_labels does.
 Draft draft_topology(const DraftOptions& options);
 
 struct SheetOptions {

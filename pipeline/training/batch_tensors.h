@@ -1,4 +1,4 @@
-// The feed's arrays as the trainers take them.
+// Converts the feed's arrays to the tensors that the trainers take.
 #pragma once
 
 #include "model/learner.h"
@@ -6,7 +6,7 @@
 
 namespace q3d::pipeline::training {
 
-// Returns tensors over the batch's arrays, which they keep alive, on the CPU.
+// Returns CPU tensors over the batch's arrays, which the tensors keep alive.
 model::TrainingBatch to_tensors(feed::FeedBatch&& from);
 
 }  // namespace q3d::pipeline::training

@@ -8,8 +8,8 @@
 namespace q3d::pipeline::training {
 namespace {
 
-constexpr std::int64_t kTrustedAfter = 50;  // losses; before that the mean says little
-constexpr double kMemory = 100.0;           // losses that the running mean reaches back
+constexpr std::int64_t kTrustedAfter = 50;  // losses; before that the mean is unreliable
+constexpr double kMemory = 100.0;           // number of losses that the running mean covers
 
 }  // namespace
 

@@ -7,7 +7,7 @@
 
 namespace q3d::pipeline::training {
 
-// Compares each loss with the running mean of those before it. Part of a run's state.
+// Compares each loss with the running mean of the earlier ones. It is part of a run's state.
 struct LossWatch {
   double mean = 0.0;
   std::int64_t seen = 0;

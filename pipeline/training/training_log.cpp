@@ -13,7 +13,8 @@
 namespace q3d::pipeline::training {
 namespace {
 
-// A killed process may leave half a line, which counts as none, as does a line of anything else.
+// Returns whether the line is a log line up to this position. A half line of a killed process is not, nor is
+// any other text.
 bool is_at_or_before(const std::string& line, int phase, std::int64_t step) {
   const nlohmann::json document = manifests::parse_json_or_null<nlohmann::json>(line);
   if (!document.is_object()) return false;

@@ -1,4 +1,4 @@
-// The log of a training run: one JSON object a line. docs/training.md describes it.
+// The log of a training run, with one JSON object on each line. docs/training.md describes it.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@ struct LogLine {
   double gradient_norm = 0.0;
   double learning_rate = 0.0;
   double samples_per_second = 0.0;
-  double seconds = 0.0;  // since this process began to train
+  double seconds = 0.0;  // time since this process began to train
   std::vector<std::pair<std::string, double>> terms;
 };
 

@@ -17,7 +17,7 @@ std::vector<fs::path> paths(const settings::PoolConfig& pool) {
   return {pool.shards.begin(), pool.shards.end()};
 }
 
-// Why a shard cannot be opened; empty if it can.
+// Says why a shard cannot be opened; empty if it can.
 std::string problem_of(const fs::path& shard) {
   try {
     const manifests::ShardReader reader(shard);

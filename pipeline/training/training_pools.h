@@ -1,4 +1,4 @@
-// The samples of a training run, compared with what is known of them before any is used.
+// The samples of a training run, which are checked before any of them is used.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -17,17 +17,18 @@ namespace q3d::pipeline::training {
 class TrainingPools {
  public:
   // Reads all shards of the pools whole (feed::check_shards) and looks at every record
-  // (feed::find_damaged_records). Damage throws std::runtime_error that counts and names it, or, with
-  // `skip_damaged`, is left out: a damaged shard with all its records, because nothing says which of them are
-  // true, and single records. Then every stored crop is decoded, too. Throws ConfigError if a pool has no
-  // sample left, Interrupted, and like check_shards.
+  // (feed::find_damaged_records). Damage throws std::runtime_error that counts and names it. With
+  // `skip_damaged`, it is left out instead: damaged records, and damaged shards with all their records,
+  // because nothing says which of these are correct. In this case every stored crop is decoded too. Throws
+  // ConfigError if a pool has no sample left, Interrupted, and like check_shards.
   TrainingPools(const std::vector<settings::PoolConfig>& pools, bool skip_damaged);
 
-  // One of the pools, without what is left out.
+  // Opens one of the pools, without the samples that are left out.
   feed::ShardPool open(const std::string& name) const;
-  // Everything that decides which samples there are: the shards' digests, by pool, and what is left out.
+  // Returns everything that decides which samples are used: the shards' digests by pool, and the samples that
+  // are left out.
   const nlohmann::json& identity() const { return identity_; }
-  const std::vector<std::string>& left_out() const { return left_out_; }  // one a line, with the reason
+  const std::vector<std::string>& left_out() const { return left_out_; }  // each with its reason
 
  private:
   struct Sound {

@@ -87,8 +87,8 @@ model::DeviceChoice choose_device(const TrainingNetworkConfig& network,
   }
 }
 
-// The config with the precision "auto" replaced by what suits the device. The run's key keeps "auto", as it
-// keeps no device.
+// Returns the config with the precision "auto" replaced by the one that suits the device. The run's key keeps
+// "auto", because it does not depend on the device.
 TrainingConfig for_device(TrainingConfig config, torch::Device device) {
   Precision& precision = config.network.precision;
   if (precision == Precision::automatic) {
@@ -97,7 +97,7 @@ TrainingConfig for_device(TrainingConfig config, torch::Device device) {
   return config;
 }
 
-// The sizes of `file`'s network, and the switches of the paper's ablations.
+// Returns the sizes of the network in `file`, with the switches of the paper's ablations.
 model::PrimaConfig initial_config(const smal::tensors::SafeTensors& file,
                                   const std::vector<std::string>& without) {
   model::PrimaConfig config = model::checkpoint_config(file);
@@ -109,8 +109,8 @@ model::PrimaConfig initial_config(const smal::tensors::SafeTensors& file,
   return config;
 }
 
-// The initial network, with the encoders of another checkpoint where the config names one; one that learns
-// its bio encoder from random weights takes the backbone alone.
+// Returns the initial network, with the encoders of another checkpoint if the config names one. A network
+// that learns its bio encoder from random weights takes only the backbone from that checkpoint.
 std::shared_ptr<model::PrimaNet> initial_net(const TrainingNetworkConfig& network,
                                              const smal::tensors::SmalAsset& asset, torch::Device device) {
   const smal::tensors::SafeTensors file = smal::tensors::SafeTensors::open(network.initial);
@@ -134,7 +134,7 @@ std::shared_ptr<model::PrimaNet> initial_net(const TrainingNetworkConfig& networ
   return net;
 }
 
-// The origin and licence of a pre-trained stem, as the initial checkpoint's metadata tell it.
+// Returns origin and licence of a pre-trained stem from the initial checkpoint's metadata.
 std::map<std::string, std::string> stem_origin(const TrainingNetworkConfig& network) {
   std::map<std::string, std::string> origin;
   const smal::tensors::SafeTensors initial = smal::tensors::SafeTensors::open(network.initial);
@@ -144,8 +144,8 @@ std::map<std::string, std::string> stem_origin(const TrainingNetworkConfig& netw
   return origin;
 }
 
-// A digest over all that decides the weights, but for device and threads: effective settings, assets and
-// samples. All files are read, because a run of days is worth it.
+// Returns a digest over everything that decides the weights except device and threads: effective settings,
+// assets and samples. All files are read, which takes little time compared with a training.
 std::string run_key(const TrainingConfig& config, const nlohmann::json& samples) {
   nlohmann::json assets = nlohmann::json::array();
   const TrainingNetworkConfig& network = config.network;
@@ -219,7 +219,7 @@ feed::Feed open_feed(const TrainingConfig& config, const PhaseConfig& phase, int
   options.rank = ranks.rank();
   options.ranks = ranks.size();
   try {
-    // Phases draw from different streams.
+    // Each phase draws from its own random stream.
     return {std::move(pools), weights, options, phase_seed(config, phase_index)};
   } catch (const std::invalid_argument& error) {
     throw run::ConfigError(fmt::format("phase \"{}\": {}", phase.name, error.what()));
@@ -232,7 +232,7 @@ std::vector<PoolConfig> pools_of(const std::vector<PhaseConfig>& phases) {
   return pools;
 }
 
-// The held-out pool. Throws ConfigError if training draws from one of its shards.
+// Returns the held-out pool. Throws ConfigError if training draws from one of its shards.
 TrainingPools held_out_pools(const TrainingConfig& config, const TrainingPools& trained, bool skip_damaged) {
   if (config.domain.held_out.empty()) return {{}, skip_damaged};
   TrainingPools pools({config.domain.held_out_pool}, skip_damaged);
@@ -326,10 +326,10 @@ class Run {
     }
   }
 
-  // Rank 0 alone writes.
+  // Returns whether this is rank 0, which alone writes.
   bool leads() const { return ranks_->rank() == 0; }
 
-  // No rank goes on before all are here.
+  // Waits until all ranks have called it.
   void meet() const { ranks_->sum(torch::zeros({1})); }
 
   bool any_rank_interrupted() const {
@@ -368,7 +368,7 @@ class Run {
     }
   }
 
-  // The present phase, from the present step, to its end or until this call must stop.
+  // Runs the current phase from the current step to its end, or until this call must stop.
   std::shared_ptr<model::PrimaNet> run_phase(const std::shared_ptr<model::PrimaNet>& from,
                                              std::optional<TrainingLog>& log, run::Progress& progress,
                                              TrainingSummary& summary) {
@@ -435,8 +435,9 @@ class Run {
     throw std::runtime_error(message);
   }
 
-  // The domain in the finished weights' metadata; none if the config says nothing of it, and for weights
-  // whose last phase trained the encoders alone, since such a network predicts no bodies yet.
+  // Returns the domain for the finished weights' metadata. It is empty if the config says nothing about it,
+  // and for weights whose last phase trained only the encoders, because such a network predicts no bodies
+  // yet.
   std::map<std::string, std::string> domain_of(const std::shared_ptr<model::PrimaNet>& net) const {
     const settings::DomainConfig& domain = config_.domain;
     if (domain.pictures.empty() || config_.phases.back().objective != Objective::prima) return {};
@@ -475,7 +476,7 @@ class Run {
   model::DeviceChoice device_;
   TrainingConfig config_;
   std::shared_ptr<const model::ranks::Collective> ranks_;
-  std::unique_ptr<manifests::FolderLock> lock_;  // rank 0's
+  std::unique_ptr<manifests::FolderLock> lock_;  // held by rank 0
   smal::tensors::SmalAsset asset_;
   model::Priors priors_;
   TrainingPools pools_;

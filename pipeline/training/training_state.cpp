@@ -26,7 +26,8 @@ constexpr const char* kPosition = "training_position";
 constexpr const char* kKey = "training_key";
 constexpr const char* kDigest = "training_sha256";
 
-// The state's numbers, with what says what they are. The order of the file plays no part.
+// Returns a digest of the state's tensors and of the text that describes them. The order in the file does not
+// matter.
 std::string state_digest(const std::map<std::string, torch::Tensor>& tensors, const std::string& position,
                          const std::string& key) {
   manifests::Sha256 digest;
@@ -71,7 +72,7 @@ void require_undamaged(const smal::tensors::SafeTensors& file) {
 
 void save_state(const std::filesystem::path& path, const model::Learner& learner,
                 const TrainingPosition& position, const std::string& key) {
-  // JSON keeps a double's shortest exact form, so the watch comes back bit for bit.
+  // JSON keeps a double's shortest exact form, so the watch is restored bit for bit.
   const nlohmann::json document = {{"phase", position.phase},
                                    {"step", position.step},
                                    {"watch_mean", position.watch.mean},
@@ -104,7 +105,7 @@ std::optional<StoredState> load_state(const std::filesystem::path& path, const s
     state.position.step = manifests::whole_number_at(document, "step");
     document.at("watch_mean").get_to(state.position.watch.mean);
     state.position.watch.seen = manifests::whole_number_at(document, "watch_seen");
-  } catch (const std::exception& error) {  // JSON's own, and whole_number's
+  } catch (const std::exception& error) {  // from the JSON library or from whole_number()
     throw std::runtime_error(fmt::format("{}: metadata \"{}\": {}", path.string(), kPosition, error.what()));
   }
   return state;

@@ -1,4 +1,4 @@
-// The state of a training run on disk.
+// Saves and loads the state of a training run.
 #pragma once
 
 #include <cstdint>
@@ -23,13 +23,13 @@ struct StoredState {
   TrainingPosition position;
 };
 
-// `key` identifies the configuration that the run belongs to.
+// Saves the state. `key` identifies the run's configuration.
 void save_state(const std::filesystem::path& path, const model::Learner& learner,
                 const TrainingPosition& position, const std::string& key);
 
-// Nothing when there is no file. Compares the file with the digest that it holds; a state of an earlier
-// version holds none, and a warning says so. Throws ConfigError when it belongs to another key,
-// std::runtime_error when it is damaged.
+// Loads the state. Returns nothing if there is no file. Compares the file with the digest that it holds; a
+// state of an earlier version has none, and a warning says so. Throws ConfigError if it belongs to another
+// key, and std::runtime_error if it is damaged.
 std::optional<StoredState> load_state(const std::filesystem::path& path, const std::string& key);
 
 }  // namespace q3d::pipeline::training

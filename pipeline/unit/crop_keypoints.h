@@ -1,4 +1,4 @@
-// The annotated keypoints of a candidate in the network's crop.
+// Computes the annotated keypoints of a candidate in the network's crop.
 #pragma once
 
 #include "manifests/sample.h"

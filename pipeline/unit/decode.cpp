@@ -19,14 +19,14 @@ namespace {
 
 using manifests::Reason;
 
-// As in the official evaluator, the area is the sum of the warped mask / 255.
+// Returns the area of a mask, which is the sum of the warped mask / 255 as in the official evaluator.
 double area_px(const cv::Mat& mask) {
   return cv::sum(mask)[0] / 255.0;
 }
 
-// Turns a mask of the stored pixels' size as the picture was turned, and scales one of the size before the
-// picture was resized. A mask of the picture's own size is returned as it is, and so is one that fits
-// neither.
+// Fits a mask to the picture. A mask of the stored pixels' size is turned like the picture, and one of the
+// size before resizing is scaled. A mask of the picture's own size is returned unchanged, and so is one that
+// fits neither.
 cv::Mat fitted_mask(const cv::Mat& mask, const manifests::SampleRecord& record, const cv::Size& size) {
   if (mask.empty() || mask.size() == size) return mask;
   const bool lies_on_its_side = loaders::pictures::exchanges_sides(record.orientation) &&
@@ -41,7 +41,7 @@ cv::Mat fitted_mask(const cv::Mat& mask, const manifests::SampleRecord& record, 
   return scaled;
 }
 
-// Appends how the picture or its labels were changed, so that a label's way can be followed back.
+// Appends how the picture or its labels were changed, so that a label can be traced back.
 void add_provenance(const manifests::SampleRecord& record, std::string& detail) {
   const auto add = [&](const std::string& text) { detail += (detail.empty() ? "" : "; ") + text; };
   if (record.orientation != 1) {
@@ -50,7 +50,7 @@ void add_provenance(const manifests::SampleRecord& record, std::string& detail) 
   if (record.scale != 1.0) add(fmt::format("box and keypoints are scaled by {:.6g}", record.scale));
 }
 
-// A picture that had a digest and is gone now (an unmounted disk) is no failed sample: it stops the run.
+// Throws if a picture that had a digest is gone now (an unmounted disk). This is not a failed sample.
 void require_present(const candidates::Candidate& candidate, const DecodedSample& decoded) {
   if (decoded.failure != Reason::image_missing || candidate.image_sha256.empty()) return;
   throw std::runtime_error(
@@ -70,8 +70,8 @@ DecodedSample decode_sample(const manifests::SampleRecord& record, Wanted want,
     return sample;
   }
   image.rgb = loaders::pictures::turned(image.rgb, record.orientation);
-  // A sample whose mask is absent, unreadable or no silhouette has none. If a file is named, the detail says
-  // what is wrong with it.
+  // A mask that is absent, unreadable or no silhouette is dropped. If a file is named, the detail says what
+  // is wrong with it.
   loaders::pictures::DecodedMask mask = loaders::pictures::decode_mask(record.mask_path);
   mask.silhouette = fitted_mask(mask.silhouette, record, image.rgb.size());
   const bool has_mask = mask.silhouette.size() == image.rgb.size();

@@ -19,12 +19,12 @@ DecodedSample decode_sample(const manifests::SampleRecord& record, Wanted want,
 double mask_area_px(const std::string& mask_path, const manifests::Box& box, int image_width_px,
                     int image_height_px);
 
-// Fills work.decoded, in parallel, with what the steps to come need of each picture (picture_needs.h).
+// Fills work.decoded, in parallel, with the parts of each picture that later steps need (picture_needs.h).
 // `rules` may be null when only predictions are wanted; then no stored crops are made. Throws as
-// decode_sample does, and std::runtime_error if a picture is gone that was there when it was digested.
+// decode_sample does, and std::runtime_error if a picture is gone that existed when it was digested.
 void decode_unit(UnitWork& work, const config::ShardConfig& shards, const config::JudgingRules* rules);
 
-// Frees the pixels of stored crops that will not be encoded: those of candidates that a verdict has dropped.
+// Frees the pixels of stored crops that will not be encoded, because a verdict has dropped their candidates.
 void free_unneeded_crops(UnitWork& work, const config::JudgingRules& rules);
 
 }  // namespace q3d::pipeline::unit

@@ -7,10 +7,10 @@
 namespace q3d::pipeline::unit {
 
 // Encodes, in parallel, the stored crops of the kept candidates that have none in work.crops yet, and adds
-// them there in the order of the candidates. Frees work.decoded. Does nothing where the unit's shard is there
-// already. Needs the judgements, and the pixels that decode_unit left. Throws std::runtime_error that names a
-// picture which could be read when it was predicted and cannot be read now: a label without its picture must
-// not be written.
+// them there in the order of the candidates. Frees work.decoded. Does nothing if the unit's shard exists
+// already. Needs the judgements, and the pixels from decode_unit. Throws std::runtime_error that names a
+// picture that could be read for its prediction but cannot be read now, because a label must not be written
+// without its picture.
 void encode_crops(UnitWork& work, const config::ShardConfig& shards);
 
 }  // namespace q3d::pipeline::unit

@@ -20,8 +20,8 @@ manifests::Judgement failed(Reason reason, const std::string& detail) {
   return judgement;
 }
 
-// adapt_request (refine.h) gives a sample with one visible keypoint no iterations, because nothing could tell
-// whether adaptation helped.
+// Judges a sample with one visible keypoint if keypoints are held out. adapt_request (refine.h) gives it no
+// iterations, because no keypoint could show whether adaptation helped.
 manifests::Judgement nothing_to_hold_out(const RefinedSample& refined) {
   manifests::Judgement judgement;
   judgement.verdict = Verdict::discarded;
@@ -75,7 +75,7 @@ manifests::Judgement judge_refined(const device::CropKeypoints& keypoints, doubl
   // A sample with a single visible keypoint cannot hold one out.
   if (holds_out && refined.held_out_curve.empty() && !is_retained) return nothing_to_hold_out(refined);
   manifests::Judgement judgement;
-  if (is_retained) {  // it was adapted all the same, by tta.refine_retained
+  if (is_retained) {  // it was adapted because of tta.refine_retained
     const bool has_held_out = !refined.held_out_curve.empty();
     judgement = filters::judge_retained(refined.curve, has_held_out ? refined.held_out_curve : refined.curve,
                                         thresholds);

@@ -1,5 +1,5 @@
-// The step that judges a unit: the fidelity rule, the guards' bounds, the least trust, and
-// what the user leaves out.
+// The step that judges a unit by the fidelity rule, the guards' bounds, the least trust and the user's
+// exclusions.
 #pragma once
 
 #include "filters/fidelity.h"
@@ -25,10 +25,10 @@ manifests::Judgement judge_refined(const device::CropKeypoints& keypoints, doubl
 // failed.
 void apply_exclusion(const candidates::Exclusion& exclusion, manifests::Judgement& judgement);
 
-// Fills work.judgements from what is known: failures, bands, adaptation curves and measured labels where
-// there are any. A label that does not come from the network is retained as it is; if it has a projection,
-// its L_proj becomes the final error. Needs work.errors beside work.predicted. Throws std::out_of_range for a
-// pseudo label whose dataset has no thresholds.
+// Fills work.judgements from failures, bands, and, where they exist, adaptation curves and measured labels. A
+// label that does not come from the network is retained unchanged; if it has a projection, its L_proj becomes
+// the final error. Needs work.predicted and work.errors. Throws std::out_of_range for a pseudo label whose
+// dataset has no thresholds.
 void judge_unit(UnitWork& work, const config::JudgingRules& rules);
 
 // Returns whether the candidate's label goes into the dataset.

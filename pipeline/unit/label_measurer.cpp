@@ -109,7 +109,7 @@ std::vector<MeasuredLabel> LabelMeasurer::measure(const UnitWork& work, const Ne
   tbb::parallel_for(std::size_t{0}, labels.size(), [&](std::size_t i) {
     measured[i].sample = labels[i].sample;
     measured[i].scores = measure_one(work, labels[i], meshes[i]);
-    // NaN if the mirrored picture's body is not finite.
+    // The score is NaN if the mirrored picture's body is not finite.
     measured[i].scores.mirror = filters::procrustes_error_mm(
         filters::mirrored_keypoints(mirrored[i].keypoints_3d, mirror_), labels[i].body->keypoints_3d);
   });

@@ -1,4 +1,4 @@
-// The trust scores of every label that the fidelity rule keeps. The guards' bounds look at some of them.
+// Measures the trust scores of every label that the fidelity rule keeps. The guards' bounds use some of them.
 #pragma once
 
 #include <memory>
@@ -14,7 +14,7 @@
 
 namespace q3d::pipeline::unit {
 
-// The models that labels are measured with.
+// The models with which labels are measured.
 struct MeasuringModels {
   std::unique_ptr<device::BodyMeshes> meshes;
   std::optional<device::PriorNumbers> priors;  // without them the scores that need them are NaN
@@ -37,7 +37,7 @@ class LabelMeasurer {
   manifests::TrustScores measure_one(const UnitWork& work, const Label& label,
                                      const device::BodyMesh& mesh) const;
 
-  std::vector<int> mirror_;  // of the 26 keypoints: the index of each one's mirror image
+  std::vector<int> mirror_;  // index of the mirror image of each of the 26 keypoints
   std::optional<device::PriorNumbers> priors_;
   std::optional<filters::LimbRange> limb_range_;
   std::unique_ptr<device::BodyMeshes> meshes_;

@@ -1,4 +1,4 @@
-// The steps of a unit get the network from a source.
+// The steps of a unit get the network from a NetworkSource.
 #pragma once
 
 #include <functional>
@@ -7,7 +7,7 @@
 
 namespace q3d::pipeline::unit {
 
-// Returns the network, and loads it at the first call: a unit without pseudo labels needs none.
+// Returns the network, which is loaded at the first call, because a unit without pseudo labels needs none.
 using NetworkSource = std::function<device::Network&()>;
 
 }  // namespace q3d::pipeline::unit

@@ -12,9 +12,10 @@ namespace {
 using filters::Band;
 using manifests::Reason;
 
-// The table says what a candidate needs at each point of its way, as far as its facts ask for it. Pseudo
-// labels need patches, samples of a shard need stored crops, and candidates that are measured against a mask
-// need the mask. A patch is needed once more when a label is measured, because its mirror image is predicted.
+// The table says which parts a candidate may need in each standing. PictureFacts decides whether it really
+// needs them. Pseudo labels need patches, samples of a shard need stored crops, and candidates that are
+// measured against a mask need the mask. A patch is needed once more when a label is measured, because its
+// mirror image is predicted.
 struct Needs {
   Standing standing;
   bool decoding;  // even if no part is needed

@@ -1,4 +1,4 @@
-// A decision table says what the steps to come need of a candidate's picture.
+// A decision table says which parts of a candidate's picture the later steps need.
 #pragma once
 
 #include <cstddef>
@@ -12,10 +12,10 @@ namespace q3d::pipeline::unit {
 
 // Says how far a candidate has come when its unit is decoded.
 enum class Standing : std::uint8_t {
-  unpredicted,  // its picture must be decoded, if only to learn whether it can be
-  to_adapt,     // the rule adapts its prediction, which has not been done
-  may_be_kept,  // no verdict so far drops it
-  finished,     // it failed, it was dropped, or the run makes predictions only
+  unpredicted,  // its picture must be decoded, at least to find out whether it can be
+  to_adapt,     // the rule adapts its prediction, but this is not done yet
+  may_be_kept,  // no verdict has dropped it so far
+  finished,     // it failed or was dropped, or the run makes only predictions
 };
 
 // The facts that decide which parts of a picture are needed.
@@ -32,15 +32,15 @@ struct PictureFacts {
 struct Wanted {
   bool patch = false;        // the network's crop
   bool stored_crop = false;  // pixels; encode.h encodes them
-  bool mask_area = false;    // of the patch; comes with it
-  bool patch_mask = false;   // likewise
+  bool mask_area = false;    // area of the patch's mask; always comes with the patch
+  bool patch_mask = false;   // mask of the patch; always comes with the patch
 };
 
-// Returns the parts that the steps to come need. It is empty if the picture need not be decoded.
+// Returns the parts that later steps need, or nothing if the picture need not be decoded.
 std::optional<Wanted> wanted(const PictureFacts& facts);
 
-// Returns the facts of candidate `i` of the unit. `rules` is null in a run that makes predictions only. Needs
-// work.judgements where work.refined is there.
+// Returns the facts of candidate `i` of the unit. `rules` is null in a run that makes only predictions. Needs
+// work.judgements if work.refined is set.
 PictureFacts picture_facts(const UnitWork& work, std::size_t i, const config::JudgingRules* rules);
 
 }  // namespace q3d::pipeline::unit

@@ -21,7 +21,7 @@ void take_annotated_body(const candidates::Candidate& candidate, PredictedSample
   }
 }
 
-// What is known of a candidate before the network is asked.
+// Returns what is known about a candidate before the network predicts it.
 PredictedSample decoded_sample(const candidates::Candidate& candidate, const DecodedSample& decoded) {
   const manifests::SampleRecord& record = candidate.record;
   PredictedSample sample;

@@ -20,8 +20,8 @@ device::AdaptRequest adapt_request(const std::string& id, const device::CropKeyp
                                    const filters::Thresholds& thresholds, const config::GuardConfig& guards);
 
 // Fills work.refined: adapts the candidates that the rule adapts, all of the unit in one call of the network.
-// Uses work.features where predict left them, which gives the same bits as encoding the crops again, and
-// frees them. Does nothing if work.refined is there.
+// Uses work.features if predict has left them, which gives the same bits as encoding the crops again, and
+// frees them. Does nothing if work.refined is set.
 void refine_unit(UnitWork& work, const NetworkSource& network, const config::JudgingRules& rules,
                  StepObserver* observer = nullptr);
 

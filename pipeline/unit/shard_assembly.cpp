@@ -30,7 +30,7 @@ void set_picture(ShardSample& sample, const PredictedSample& predicted) {
   sample.patch_box = {box.center_x_px, box.center_y_px, box.side_px};
 }
 
-// The bytes move; they are not copied.
+// Moves the bytes instead of copying them.
 void take_crop(ShardSample& sample, EncodedCrop& crop) {
   sample.crop = std::move(crop.picture);
   sample.crop_mask = std::move(crop.mask);
@@ -52,7 +52,7 @@ std::vector<ShardSample> shard_samples(UnitWork& work) {
   for (const RefinedSample& refined : *work.refined) refined_bodies[refined.sample] = &refined.body;
   const std::vector<EncodedCrop*> crops = crops_by_position(work);
   std::vector<ShardSample> samples;
-  samples.reserve(work.candidates.size());  // a sample is large to move
+  samples.reserve(work.candidates.size());  // samples are large, so avoid moving them
   for (std::size_t i = 0; i < work.candidates.size(); ++i) {
     const manifests::Judgement& judgement = work.judgements[i];
     if (!is_kept(judgement)) continue;

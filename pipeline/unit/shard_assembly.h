@@ -1,4 +1,4 @@
-// A judged unit -> the samples of its shard.
+// Makes the samples of a shard from a judged unit.
 #pragma once
 
 #include <vector>
@@ -10,7 +10,7 @@ namespace q3d::pipeline::unit {
 
 // Returns the kept candidates of the unit in ingest order. Takes the bytes of their stored crops out of
 // work.crops. Needs predicted, refined, judgements and the crop of every kept candidate; throws
-// std::logic_error where one is missing.
+// std::logic_error if one is missing.
 std::vector<manifests::ShardSample> shard_samples(UnitWork& work);
 
 }  // namespace q3d::pipeline::unit

@@ -18,12 +18,13 @@ class StepObserver {
   StepObserver& operator=(const StepObserver&) = delete;
   virtual ~StepObserver() = default;
 
-  // Called once for each candidate of the unit, with what predict found for the candidate at `position`.
+  // Called once for each candidate of the unit, with the prediction of the candidate at `position`.
   virtual void predicted(const UnitWork& /*work*/, std::size_t /*position*/,
                          const PredictedSample& /*sample*/) {}
-  // Called once for each candidate that is adapted, with what refine found. work.predicted is there.
+  // Called once for each candidate that is adapted, with its result. work.predicted is set.
   virtual void refined(const UnitWork& /*work*/, const RefinedSample& /*sample*/) {}
-  // Called after a batch: `done` of the `total` candidates that the step gives to the network are through.
+  // Called after a batch, when `done` of the `total` candidates that the step gives to the network are
+  // finished.
   virtual void batch_done(const UnitWork& /*work*/, std::string_view /*step*/, std::size_t /*done*/,
                           std::size_t /*total*/) {}
 };

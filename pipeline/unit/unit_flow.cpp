@@ -12,14 +12,15 @@
 namespace q3d::pipeline::unit {
 namespace {
 
-// A unit and its turn, for units need not be claimed in order.
+// A unit and its turn. The turns are in the order of the claims, in which units need not be in order.
 struct Turn {
   std::size_t number = 0;
   std::shared_ptr<UnitWork> work;
 };
 using Item = std::shared_ptr<Turn>;
 
-// The first exception of any node; once there is one, items pass through untouched so that the graph drains.
+// Holds the first exception of any node. Once there is one, items pass through the nodes unchanged, so that
+// the graph drains.
 class FirstFailure {
  public:
   template <typename Step>

@@ -1,4 +1,4 @@
-// The flow graph: reads like the paper's figure of Stage 2.
+// The flow graph, which reads like the paper's figure of Stage 2.
 //
 //   read -> decode + crop (parallel) -> predict -> judge -> refine -> judge (device thread)
 //        -> encode (parallel) -> write (in order)
@@ -16,11 +16,11 @@ namespace q3d::pipeline::unit {
 
 struct UnitFlow {
   std::int64_t units = 0;
-  int units_in_flight = 3;  // bounds memory: decoded pictures of that many units at most
-  // Gives the unit to make next; nothing ends the run. Called one at a time. If empty, all units are made in
-  // order.
+  int units_in_flight = 3;  // bounds memory: at most so many units hold decoded pictures
+  // Returns the next unit to make, or nothing to end the run. Calls do not overlap. If `claim` is empty, all
+  // units are made in order.
   std::function<std::optional<std::int64_t>()> claim;
-  // Makes the item of unit i, with what an earlier run left. Called in the order of the claims, one at a
+  // Makes the item of unit i, with the results of an earlier run. Called in the order of the claims, one at a
   // time.
   std::function<std::shared_ptr<UnitWork>(std::int64_t)> read;
   // Called concurrently for several units.

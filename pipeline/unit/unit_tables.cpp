@@ -13,7 +13,7 @@ namespace {
 
 using manifests::Table;
 
-// One member of every row's body, end to end.
+// Returns one member of every row's body, end to end.
 template <typename Row, typename Part, typename Value>
 void add_field(Table& table, const std::string& name, const std::vector<Row>& rows,
                std::vector<std::int64_t> row_shape, Value Part::*field) {
@@ -26,7 +26,8 @@ void add_field(Table& table, const std::string& name, const std::vector<Row>& ro
   table.add<float>(name, std::move(row_shape), values);
 }
 
-// The numbers of a column, of which every row has so many. Throws std::runtime_error if it is another column.
+// Returns the numbers of a column with a given count in every row. Throws std::runtime_error if the column
+// differs.
 template <typename T>
 std::span<const T> numbers_of(const Table& table, const std::string& name, std::size_t per_row) {
   const std::span<const T> numbers = table.column<T>(name);
@@ -47,7 +48,7 @@ void read_field(const Table& table, const std::string& name, std::vector<Row>& r
   }
 }
 
-// The fields of a body, named once for writing and reading.
+// Visits the fields of a body, so that writing and reading share their names.
 template <typename Visitor>
 void visit_body(Visitor&& visit) {
   visit("rotations", std::vector<std::int64_t>{manifests::kNumJoints, 3, 3}, &device::BodyPrediction::pose);
@@ -78,7 +79,7 @@ void read_bodies(const Table& table, std::vector<Row>& rows) {
   });
 }
 
-// float64 numbers, as many a row as its curve has.
+// Adds a column of curves, in which each row has the float64 numbers of its curve.
 void add_curves(Table& table, const std::string& name, const std::vector<RefinedSample>& samples,
                 std::vector<double> RefinedSample::*curve) {
   auto& blobs = table.blobs[name];
@@ -88,7 +89,7 @@ void add_curves(Table& table, const std::string& name, const std::vector<Refined
   }
 }
 
-// Leaves the curves empty where the table has no such column.
+// Reads the curves. Leaves them empty if the table has no such column.
 void read_curves(const Table& table, const std::string& name, std::vector<RefinedSample>& samples,
                  std::vector<double> RefinedSample::*curve) {
   const auto blobs = table.blobs.find(name);
@@ -105,7 +106,7 @@ void read_curves(const Table& table, const std::string& name, std::vector<Refine
   }
 }
 
-// Those that are measured; the combined score is computed from them when a unit is judged.
+// Returns the columns that are measured. The combined score is computed from them when a unit is judged.
 std::span<const manifests::TrustColumn> measured_columns() {
   return std::span(manifests::kTrustColumns).subspan(1);
 }
@@ -116,7 +117,7 @@ const std::vector<std::string>& text_column(const Table& table, const std::strin
   return found->second;
 }
 
-// reason_from_string() throws std::invalid_argument, as for a name in a config.
+// Reads a reason. reason_from_string() throws std::invalid_argument, which would mean a wrong config.
 manifests::Reason reason_in(const std::string& column, const std::string& name) {
   try {
     return manifests::reason_from_string(name);
@@ -131,7 +132,8 @@ std::vector<std::vector<std::byte>>& blob_column(Table& table, const std::string
   return found->second;
 }
 
-// Texts of the table are padded with NUL, so none may hold one; a hostile annotation file's may.
+// Replaces NULs in a text. The table pads texts with NUL, so none may contain one, but a hostile annotation
+// file's may.
 std::string storable(std::string text) {
   std::replace(text.begin(), text.end(), '\0', '?');
   return text;
@@ -221,7 +223,7 @@ Table to_table(const std::vector<RefinedSample>& samples) {
   positions.reserve(samples.size());
   for (const RefinedSample& sample : samples) positions.push_back(static_cast<std::int64_t>(sample.sample));
   add_curves(table, "curve", samples, &RefinedSample::curve);
-  // The column is absent where nothing was held out.
+  // The column is absent if nothing was held out.
   const bool holds_out = std::any_of(samples.begin(), samples.end(), [](const RefinedSample& sample) {
     return !sample.held_out_curve.empty();
   });

@@ -1,4 +1,4 @@
-// The one item that travels through the flow graph: a unit and what the stages have made of it so far.
+// The item that travels through the flow graph: a unit with the results of its stages so far.
 #pragma once
 
 #include <cstddef>
@@ -20,11 +20,11 @@ namespace q3d::pipeline::unit {
 // comes from the network or, depending on the role, from the annotation file.
 struct PredictedSample {
   manifests::Reason failure = manifests::Reason::none;
-  std::string detail;  // of the failure, or a remark (a mask that was left out)
+  std::string detail;  // text of the failure, or a remark (a mask that was left out)
   int image_width_px = 0;
   int image_height_px = 0;
   bool has_mask = false;
-  device::BodyPrediction body;  // meaningful when failure is none; no_body() for 2d_only
+  device::BodyPrediction body;  // valid if failure is none; no_body() for 2d_only
 };
 
 // The result of refine for one candidate of the middle band.
@@ -32,7 +32,7 @@ struct RefinedSample {
   std::size_t sample = 0;              // position within the unit
   std::vector<double> curve;           // L_proj of iterates 0..n, crop units
   device::BodyPrediction body;         // the iterate of least L_proj, or of least held-out error
-  std::vector<double> held_out_curve;  // the held-out keypoints' error of the same iterates; empty without
+  std::vector<double> held_out_curve;  // error of the held-out keypoints for the same iterates, if any
 };
 
 // The measurements of one candidate that the fidelity rule keeps: all trust scores but the combined one.
@@ -65,11 +65,11 @@ struct DecodedSample {
 
 struct UnitWork {
   const candidates::Unit* unit = nullptr;
-  std::vector<candidates::Candidate> own_candidates;  // what the next member spans, in an item of open_unit()
-  std::span<const candidates::Candidate> candidates;  // the unit's own; set_candidates
+  std::vector<candidates::Candidate> own_candidates;  // storage of the next member, in an item of open_unit()
+  std::span<const candidates::Candidate> candidates;  // candidates of the unit; see set_candidates
   std::vector<device::CropKeypoints> keypoints;       // by position: the annotated ones, in the crop
 
-  // Filled from the journal where an earlier run had finished the stage, else by the stage's node.
+  // Each is loaded if an earlier run had finished the stage, and else filled by the stage's node.
   std::optional<std::vector<PredictedSample>> predicted;
   std::optional<std::vector<RefinedSample>> refined;
   std::optional<std::vector<MeasuredLabel>> measured;
@@ -78,11 +78,11 @@ struct UnitWork {
   bool measured_before = false;
   bool shard_before = false;
 
-  // L_proj of the bodies in `predicted` by position, in crop units. It is NaN where the candidate failed,
-  // where no keypoint is visible, and where the body has no projection.
+  // L_proj of the bodies in `predicted` by position, in crop units. It is NaN if the candidate failed, if no
+  // keypoint is visible, or if the body has no projection.
   std::vector<double> errors;
-  // The features, by position, of the candidates that the rule adapts. Predict leaves them, refine frees
-  // them. Empty in a resumed run, which encodes these pictures again.
+  // The features, by position, of the candidates that the rule adapts. predict_unit fills them and
+  // refine_unit frees them. They are empty in a resumed run, which encodes these pictures again.
   std::vector<device::KeptFeatures> features;
   std::vector<DecodedSample> decoded;            // by position; freed once the stored crops are encoded
   std::vector<manifests::Judgement> judgements;  // by position
@@ -103,7 +103,7 @@ std::shared_ptr<UnitWork> open_unit(const candidates::Ingest& ingest, std::int64
 // Sets work.predicted and computes work.errors. Needs the candidates.
 void set_predictions(UnitWork& work, std::vector<PredictedSample> samples);
 
-// Returns the stored crop of the candidate at this position, or null where none has been encoded.
+// Returns the stored crop of the candidate at this position, or null if none has been encoded.
 const EncodedCrop* find_crop(const UnitWork& work, std::size_t sample);
 
 }  // namespace q3d::pipeline::unit

@@ -26,7 +26,7 @@ std::vector<Eigen::Vector3f> vertex_normals(std::span<const Eigen::Vector3f> ver
   return normals;
 }
 
-// The pixels that may show the animal.
+// Returns the rectangle of pixels that may show the animal.
 cv::Rect projected_rect(std::span<const Eigen::Vector3f> vertices, const PictureCamera& camera,
                         cv::Size size) {
   double left = size.width, top = size.height, right = 0.0, bottom = 0.0;
@@ -63,7 +63,7 @@ AnimalLayer::AnimalLayer(const render::RayDevice& device, const RestMesh& rest, 
       normals_(vertex_normals(vertices_, rest.triangles)),
       rays_(device, vertices_, rest.triangles) {}
 
-// One ray a pixel; pixels on the outline get four more and are covered in part.
+// Casts one ray for each pixel. Pixels on the outline get four more rays and may be partly covered.
 std::vector<AnimalLayer::Fragment> AnimalLayer::fragments(cv::Size picture_px,
                                                           const PictureCamera& camera) const {
   const cv::Rect area = projected_rect(vertices_, camera, picture_px);
@@ -141,7 +141,7 @@ cv::Mat1b AnimalLayer::paint(cv::Mat& picture, const PictureCamera& camera, cons
     const BodyZone zone = painter.zone(rest_.triangles[pixel.hit.triangle], pixel.hit.u, pixel.hit.v);
     const float upward = 0.5F + 0.5F * normals[i].dot(ground.up);
     const float sun = shadow[i] != 0 ? 0.0F : std::max(0.0F, (normals[i].dot(light.to_sun) + 0.15F) / 1.15F);
-    // The belly and the insides of the legs see little of the sky.
+    // The belly and the insides of the legs receive little light from the sky.
     const float open = 1.0F - 0.45F * zone.belly;
     const Colour incoming = open * blend(light.bounce, light.sky, upward) + sun * light.sun;
     const Eigen::Vector3f halfway = (light.to_sun - pixel.ray.normalized()).normalized();
@@ -164,7 +164,7 @@ cv::Mat1b AnimalLayer::paint(cv::Mat& picture, const PictureCamera& camera, cons
 
 void AnimalLayer::cast_shadow(cv::Mat& picture, const PictureCamera& camera, const Ground& ground,
                               const Light& light) const {
-  // Shadows are soft: a quarter of the pixels is enough.
+  // Shadows are soft, so a quarter of the pixels is enough.
   constexpr int kStep = 2;
   const cv::Size size((picture.cols + kStep - 1) / kStep, (picture.rows + kStep - 1) / kStep);
   const Eigen::Vector3f centre =
@@ -182,7 +182,7 @@ void AnimalLayer::cast_shadow(cv::Mat& picture, const PictureCamera& camera, con
         const float t = ground.hit(ray);
         if (t <= 0.0F) continue;
         const Eigen::Vector3f origin = t * ray + 0.004F * ground.up;
-        if ((centre - origin).cross(direction).norm() > radius) continue;  // the ray misses the whole animal
+        if ((centre - origin).cross(direction).norm() > radius) continue;  // the ray misses the animal
         origins.push_back(origin);
         places.push_back(static_cast<std::size_t>(row * size.width + column));
       }

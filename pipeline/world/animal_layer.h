@@ -1,4 +1,4 @@
-// The animal in the picture: its pixels, its shadow and what its own body hides.
+// Renders the animal: its pixels, its shadow, and the points that its own body hides.
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -14,11 +14,12 @@ namespace q3d::pipeline::world {
 
 class AnimalLayer {
  public:
-  // body + translation is where the animal stands in the camera's frame. rest and device must outlive this.
+  // body + translation is the animal's position in the camera's frame. rest and device must outlive this
+  // object.
   AnimalLayer(const render::RayDevice& device, const RestMesh& rest, const Body& body,
               const Eigen::Vector3f& translation);
 
-  // Darkens the ground (picture: BGR, 8 bit) where the sun or most of the sky is behind the animal.
+  // Darkens the ground (picture: BGR, 8 bit) where the animal hides the sun or most of the sky.
   void cast_shadow(cv::Mat& picture, const PictureCamera& camera, const Ground& ground,
                    const Light& light) const;
 

@@ -11,7 +11,7 @@ namespace {
 
 using nlohmann::json;
 
-// A float as its shortest decimal, so that 0.3F is written 0.3 and reads back as the same float.
+// Converts a float to its shortest decimal, so that 0.3F is written as 0.3 and reads back as the same float.
 double decimal(float value) {
   char text[32];
   const auto end = std::to_chars(text, text + sizeof text, value).ptr;
@@ -60,7 +60,7 @@ json xywh(const cv::Rect& box) {
   return {box.x, box.y, box.width, box.height};
 }
 
-// The smallest box around the labelled points; empty when there are none.
+// Returns the smallest box around the labelled points; empty if there are none.
 cv::Rect2d around(std::span<const Label> labels) {
   double left = 1e9, top = 1e9, right = -1e9, bottom = -1e9;
   for (const Label& label : labels) {
@@ -147,7 +147,7 @@ json superanimal_annotations(std::span<const FinishedPicture> pictures,
                            {"bbox", std::move(box)},
                            {"area", area},
                            {"iscrowd", 0},
-                           {"num_keypoints", names.size()},  // always all, labelled or not
+                           {"num_keypoints", names.size()},  // always the number of all keypoints
                            {"keypoints", std::move(keypoints)}});
   }
   return {{"images", std::move(images)},

@@ -15,7 +15,8 @@ bool contains_any(const std::string& name, std::span<const std::string_view> par
   return false;
 }
 
-// The points that are confused together. Names are those of all three datasets.
+// Returns whether a point belongs to a group of points that are confused together. The names are those of all
+// three datasets.
 bool in_group(const std::string& name, int group) {
   static constexpr std::array<std::string_view, 5> kFore{"front", "Elbow", "Wrist", "shoulder", "Shoulder"};
   static constexpr std::array<std::string_view, 4> kHind{"back_", "Knee", "Ankle", "Hip"};

@@ -9,7 +9,7 @@
 namespace q3d::pipeline::world {
 namespace {
 
-// Directions along the ground, so that its texture can be indexed.
+// Directions along the ground, which index its texture.
 struct GroundAxes {
   Eigen::Vector3f across, along;
   explicit GroundAxes(const Eigen::Vector3f& up) {
@@ -26,10 +26,10 @@ struct Painter {
   const Ground& ground;
   const NoiseField& noise;
   manifests::Rng& rng;
-  float subject_distance;  // where the lens is focused
+  float subject_distance;  // focus distance of the lens
   cv::Mat picture;         // BGR, 8 bit
   cv::Mat1f distance;      // along the ray to the ground; -1 where there is none
-  float shift_x, shift_y;  // this picture's place in the noise field
+  float shift_x, shift_y;  // position of this picture in the noise field
 
   Colour ground_colour(float x, float y, float texel) const;
   Colour far_colour(int column, int row, float above) const;
@@ -44,7 +44,8 @@ cv::Vec3b pixel(const Colour& colour) {
           static_cast<std::uint8_t>(scaled[0])};
 }
 
-// x, y in SMAL units along the ground; texel is the size of a pixel there, which hides what is finer.
+// Returns the colour at x, y (SMAL units along the ground). texel is the size of a pixel there; finer detail
+// is left out.
 Colour Painter::ground_colour(float x, float y, float texel) const {
   const float scale = backdrop.ground_scale;
   const float patches = noise.octaves(0.35F * scale * x + shift_x, 0.35F * scale * y + shift_y, 2);
@@ -59,7 +60,7 @@ Colour Painter::ground_colour(float x, float y, float texel) const {
   return colour;
 }
 
-// Above the ground's edge: sky, and before it what stands on the horizon.
+// Returns the colour above the ground's edge: the sky, or the things on the horizon in front of it.
 Colour Painter::far_colour(int column, int row, float above) const {
   const auto height = static_cast<float>(picture.rows);
   const float x = 6.0F * static_cast<float>(column) / height, y = 6.0F * static_cast<float>(row) / height;
@@ -82,7 +83,8 @@ Colour Painter::far_colour(int column, int row, float above) const {
 
 void Painter::paint_far_and_ground() {
   const GroundAxes axes(ground.up);
-  // The row where the ground ends, for the sky's gradient: the horizon at the picture's middle column.
+  // The sky's gradient starts at the row where the ground ends, which is the horizon at the picture's middle
+  // column.
   const double slope = ground.up.y() == 0.0F ? 0.0 : -ground.up.z() / ground.up.y();
   const double horizon = camera.centre_y_px + camera.focal_px * slope;
   for (int row = 0; row < picture.rows; ++row) {
@@ -104,7 +106,8 @@ void Painter::paint_far_and_ground() {
   }
 }
 
-// The lens is focused on the animal: what is nearer or farther blurs, the sky and the horizon most.
+// Blurs everything that is nearer or farther than the animal, on which the lens is focused. The sky and the
+// horizon blur most.
 void Painter::soften_distance() {
   const double sigma = backdrop.defocus * picture.rows;
   if (sigma < 0.4) return;

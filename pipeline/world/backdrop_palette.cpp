@@ -10,7 +10,8 @@ struct Range {
   double low, high;
 };
 
-// One row a place: three pairs of colours (far, ground, blades), the ground's flecks, and what stands there.
+// A row for each place: three pairs of colours (far, ground, blades), the ground's flecks, and the things
+// that stand there.
 struct PlaceRow {
   Place place;
   std::string_view name;
@@ -177,8 +178,8 @@ float drawn(const Range& range, manifests::Rng& rng) {
   return static_cast<float>(rng.uniform(range.low, range.high));
 }
 
-// Draws what is above the horizon: weather outside, leaves in a forest, a wall in a room, a screen in a
-// studio.
+// Chooses the background above the horizon: weather outside, leaves in a forest, a wall in a room, a screen
+// in a studio.
 void draw_sky(Backdrop& b, manifests::Rng& rng) {
   const double weather = rng.uniform();
   if (b.place == Place::forest) {

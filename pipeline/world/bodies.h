@@ -1,4 +1,4 @@
-// The bodies of the world as plain arrays: the only part of the world that computes with LibTorch.
+// Computes the bodies of the world as plain arrays. No other part of the world uses LibTorch.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,14 +13,14 @@
 
 namespace q3d::pipeline::world {
 
-// The parameters that the network is to find: SMAL's pose (axis-angle, rad; the first three numbers are the
+// The parameters that the network should find: SMAL's pose (axis-angle, rad; the first three numbers are the
 // global orientation) and shape.
 struct Posture {
   std::array<float, 3 * smal::kNumJoints> pose{};
   std::array<float, smal::kNumBetas> betas{};
 };
 
-// A posed body, SMAL units, turned into the camera's frame but not moved: add the translation to see it.
+// A posed body in SMAL units. It is rotated into the camera's frame, but the translation is not added.
 struct Body {
   std::vector<Eigen::Vector3f> vertices;
   std::array<Eigen::Vector3f, smal::kNumKeypoints> keypoints;
@@ -46,7 +46,7 @@ class BodyModel {
   const RestMesh& rest() const;
   const ShapeSpace& shapes() const;
   void save(const std::filesystem::path& asset) const;  // throws std::runtime_error
-  // Bodies in the order of the postures. The numbers do not depend on the number of threads.
+  // Returns bodies in the order of the postures. The numbers do not depend on the number of threads.
   std::vector<Body> pose(std::span<const Posture> postures) const;
 
  private:

@@ -7,7 +7,7 @@
 namespace q3d::pipeline::world {
 namespace {
 
-// SMAL's joints by body part (the tree of the official asset; the synthetic quadruped keeps it).
+// SMAL's joints by body part. The synthetic quadruped has the same tree as the official asset.
 struct JointRange {
   int first, last;
 };
@@ -19,7 +19,7 @@ constexpr JointRange kHead[] = {{16, 16}, {32, 34}};
 constexpr JointRange kEars[] = {{33, 34}};
 constexpr JointRange kNeck[] = {{15, 15}};
 
-// The keypoints that carry colour of their own.
+// The keypoints that have their own colour.
 enum Keypoint { left_eye = 0, right_eye = 1, left_mouth = 22, right_mouth = 23, nose = 24 };
 
 template <std::size_t N>
@@ -50,14 +50,15 @@ Eigen::Vector3f mean_of(const RestMesh& rest, int keypoint) {
   return sum / static_cast<float>(group.size());
 }
 
-// Keypoints may lie inside the body; colour lies on it.
+// Returns the nearest point on the surface. Keypoints may lie inside the body, but colour lies on its
+// surface.
 Eigen::Vector3f on_surface(const RestMesh& rest, const Eigen::Vector3f& point) {
   return *std::min_element(rest.vertices.begin(), rest.vertices.end(), [&](const auto& a, const auto& b) {
     return (a - point).squaredNorm() < (b - point).squaredNorm();
   });
 }
 
-// Gamma 2 is close enough to a screen's, and cheap to undo.
+// Converts screen values to linear light with gamma 2, which is close to a screen's and cheap to invert.
 Colour linear(const Colour& screen) {
   return screen * screen;
 }
@@ -118,7 +119,7 @@ float CoatPainter::wetness(const BodyZone& zone) const {
                   1.0F - smooth_step(0.8F * nose_radius_, 1.2F * nose_radius_, nose_gap));
 }
 
-// The coat without its markings.
+// Returns the colour of the coat without its markings.
 Colour CoatPainter::ground_colour(const Coat& coat, const BodyZone& zone, float ruffle) const {
   Colour colour = coat.back;
   const float edge = 1.0F - coat.belly_height;
@@ -178,7 +179,7 @@ Colour CoatPainter::albedo(const Coat& coat, const BodyZone& zone, const Eigen::
   const float crest = std::max(coat.mane * smooth_step(0.25F, 0.5F, zone.crest + 0.15F * ruffle),
                                coat.ruff * smooth_step(0.35F, 0.6F, zone.ruff + 0.1F * ruffle));
   colour = blend(colour, coat.crest, std::max(crest, smooth_step(0.4F, 0.7F, zone.tail_tip)));
-  // Hair runs along the body: fine streaks along x, coarser tufts.
+  // Hair runs along the body, in fine streaks along x and in coarser tufts.
   const float hair = noise_.at(Eigen::Vector3f(18.0F * p.x(), 70.0F * p.y(), 70.0F * p.z()) + individual);
   const float tufts = noise_.octaves(14.0F * p + individual, 2);
   colour *= 1.0F + coat.shag * (0.6F * hair + 0.8F * tufts + 0.4F * ruffle);

@@ -3,7 +3,8 @@
 namespace q3d::pipeline::world {
 namespace {
 
-// Photographs from the web (ImageNet, COCO), with labels by paid annotators and a fitted body.
+// Returns the domain of photographs from the web (ImageNet, COCO), with labels by paid annotators and a
+// fitted body.
 Domain animal3d() {
   Domain d;
   d.id = SetId::animal3d;
@@ -29,8 +30,8 @@ Domain animal3d() {
   return d;
 }
 
-// Pictures that a diffusion model painted over rendered bodies: clean, saturated, the label exact, the whole
-// animal in view.
+// Returns the domain of pictures that a diffusion model painted over rendered bodies. They are clean and
+// saturated, with exact labels and the whole animal in view.
 Domain ctrlani3d() {
   Domain d;
   d.id = SetId::ctrlani3d;
@@ -60,7 +61,8 @@ Domain ctrlani3d() {
   return d;
 }
 
-// Eight collections of many hands: more species, more poses, more distance, cruder labels.
+// Returns the domain of eight collections by many people, with more species, more poses, more distance and
+// cruder labels.
 Domain superanimal() {
   Domain d;
   d.id = SetId::superanimal;
@@ -90,8 +92,8 @@ Domain superanimal() {
   return d;
 }
 
-// Frames of films and camera traps: small or cropped animals, grey nights, stamps, movement; boxes that
-// follow the labelled points.
+// Returns the domain of frames from films and camera traps, with small or cropped animals, grey nights,
+// stamps and movement. Boxes follow the labelled points.
 Domain animal_kingdom() {
   Domain d;
   d.id = SetId::animal_kingdom;

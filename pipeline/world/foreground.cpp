@@ -8,7 +8,7 @@
 namespace q3d::pipeline::world {
 namespace {
 
-// A picture of the occluder alone and how much it covers.
+// A picture of the occluder alone, with its coverage.
 struct Layer {
   cv::Mat colour;
   cv::Mat1b cover;
@@ -29,7 +29,8 @@ struct Layer {
     cv::ellipse(cover, centre, axes, degrees, 0, 360, cv::Scalar(255), cv::FILLED, cv::LINE_AA);
   }
   void soften(double sigma) {
-    // Colour must not bleed in from the empty part: blur it multiplied by the cover, then divide.
+    // Blur the colour multiplied by the cover, and then divide, so that no colour bleeds in from the empty
+    // part.
     cv::Mat weight, product, soft_weight;
     cv::cvtColor(cover, weight, cv::COLOR_GRAY2BGR);
     cv::multiply(colour, weight, product, 1.0 / 255.0, CV_32F);
@@ -88,7 +89,7 @@ void upright(Layer& layer, const cv::Rect& animal, manifests::Rng& rng) {
   }
 }
 
-// A tuft: dense and high in its middle, thin at its edges.
+// Draws a tuft of grass that is dense and high in its middle and thin at its edges.
 void tall_grass(Layer& layer, const cv::Rect& animal, const Backdrop& backdrop, manifests::Rng& rng) {
   const int blades = 60 + rng.below(120);
   const double height = animal.height * rng.uniform(0.2, 0.5);
@@ -106,7 +107,7 @@ void tall_grass(Layer& layer, const cv::Rect& animal, const Backdrop& backdrop, 
   }
 }
 
-// Half a boulder before the animal: an uneven outline, its top lit.
+// Draws the upper half of a boulder in front of the animal, with an uneven outline and a lit top.
 void stone(Layer& layer, const cv::Rect& animal, manifests::Rng& rng) {
   const Colour colour = blend(rgb(84, 80, 74), rgb(168, 162, 152), static_cast<float>(rng.uniform()));
   const double width = animal.width * rng.uniform(0.12, 0.3),

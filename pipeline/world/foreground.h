@@ -1,4 +1,4 @@
-// Draws what stands between the camera and the animal.
+// Draws things between the camera and the animal.
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -15,8 +15,8 @@ namespace q3d::pipeline::world {
 void paint_occluder(cv::Mat& picture, cv::Mat1b& cover, const cv::Rect& animal_px, const Backdrop& backdrop,
                     manifests::Rng& rng);
 
-// Grass in front of the feet: blades that start at the vertices nearest the ground. Too thin to hide
-// anything.
+// Paints grass in front of the feet, with blades that start at the vertices nearest the ground. They are too
+// thin to hide anything.
 void paint_grass_at_feet(cv::Mat& picture, const Backdrop& backdrop, const PictureCamera& camera,
                          const Ground& ground, std::span<const Eigen::Vector3f> vertices,
                          manifests::Rng& rng);

@@ -32,7 +32,7 @@ Extent projected_extent(std::span<const Eigen::Vector3f> vertices, const Picture
   return extent;
 }
 
-// Factors by which a person's box differs from the silhouette's, and how far it is off centre.
+// The factors by which a person's box differs from the silhouette's, and its offset from the centre.
 struct BoxError {
   double width = 1.0, height = 1.0, shift_x = 0.0, shift_y = 0.0;
 };
@@ -57,7 +57,7 @@ Extent clipped(Extent extent, cv::Size picture_px) {
   return extent;
 }
 
-// The intended place of the animal's bounding box, drawn before its exact proportions are known.
+// The intended position of the animal's bounding box, drawn before its exact proportions are known.
 struct Placement {
   double side_px;
   cv::Point2d centre_px;
@@ -78,7 +78,7 @@ Placement draw_placement(double aspect, cv::Size picture_px, const FramingHabits
   Placement placement{side, {centre(width, picture_px.width), centre(height, picture_px.height)}};
   if (rng.chance(habits.truncated)) {
     placement.side_px *= rng.uniform(1.0, 1.4);
-    // Push it over one border, by up to a third of its own size.
+    // Move it over one border by up to a third of its own size.
     const double over = rng.uniform(0.08, 0.33) * placement.side_px;
     const double half_w = 0.5 * width * placement.side_px / side,
                  half_h = 0.5 * height * placement.side_px / side;
@@ -106,7 +106,8 @@ PictureCamera camera_of_box(const cv::Rect& box) {
     throw std::invalid_argument("camera_of_box: box of " + std::to_string(box.width) + " x " +
                                 std::to_string(box.height) + " px");
   }
-  // Official code: the datasets' centre is (2 x + w) // 2, the crop's side is the box's longer one.
+  // As in the official code's datasets, the centre is (2 x + w) // 2 and the crop's side is the box's longer
+  // one.
   return {smal::kFocalPx * std::max(box.width, box.height) / smal::kCropSidePx,
           std::floor((2.0 * box.x + box.width) / 2.0), std::floor((2.0 * box.y + box.height) / 2.0)};
 }

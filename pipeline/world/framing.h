@@ -2,9 +2,9 @@
 // the box.
 //
 // The network's crop camera has focal 1000 px for a crop scaled to 256 px and its principal point in the
-// crop's centre. A picture is therefore rendered with that very camera, carried to its own pixels: focal 1000
-// * side / 256 px, principal point in the (floored) centre of the annotated box. It is a part of a larger
-// sensor's picture, so to say. The translation that goes with it is then exact.
+// crop's centre. A picture is therefore rendered with this camera, expressed in its own pixels: focal 1000
+// * side / 256 px, principal point in the (floored) centre of the annotated box. It is like a part of a
+// larger sensor's picture, and the translation is exact.
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -28,11 +28,12 @@ struct Framing {
   Eigen::Vector3f translation{0.0F, 0.0F, 0.0F};
 };
 
-// The camera that belongs to a box (see the note above). Throws std::invalid_argument on an empty box.
+// Returns the camera that belongs to a box (see the note above). Throws std::invalid_argument on an empty
+// box.
 PictureCamera camera_of_box(const cv::Rect& box);
 
-// The translation with which the projected vertices have their bounding box's centre at `centre_px` and its
-// longer side equal to `side_px`.
+// Returns the translation with which the bounding box of the projected vertices has its centre at `centre_px`
+// and its longer side equal to `side_px`.
 Eigen::Vector3f fit_translation(std::span<const Eigen::Vector3f> vertices, const PictureCamera& camera,
                                 const cv::Point2d& centre_px, double side_px);
 

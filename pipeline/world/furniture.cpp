@@ -1,4 +1,4 @@
-// The things that stand behind the animal.
+// Draws the things that stand behind the animal.
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
@@ -14,7 +14,8 @@ struct Spot {
   double unit_px;  // pixels of one SMAL unit there
 };
 
-// A place on the ground beyond the animal. The depth is drawn, then the height follows from the plane.
+// Returns a random place on the ground behind the animal. The depth is drawn, and the height follows from the
+// plane.
 Spot spot_behind(const cv::Mat& picture, const PictureCamera& camera, const Ground& ground,
                  float subject_distance, manifests::Rng& rng) {
   const double column = rng.uniform(-0.05, 1.05) * picture.cols;

@@ -11,7 +11,7 @@
 namespace q3d::pipeline::world {
 namespace {
 
-// SMAL's 26, by the names that the tables below use.
+// The names of SMAL's 26 keypoints in the tables below.
 constexpr std::array<std::string_view, smal::kNumKeypoints> kBodyNames{"left_eye",
                                                                        "right_eye",
                                                                        "chin",
@@ -119,7 +119,7 @@ int keypoint_named(std::string_view place) {
   return found == kBodyNames.end() ? -1 : static_cast<int>(found - kBodyNames.begin());
 }
 
-// Vertices of the resting mesh at the places that SMAL's keypoints leave out.
+// Finds vertices of the resting mesh at places that SMAL's keypoints do not cover.
 class SurfacePlaces {
  public:
   explicit SurfacePlaces(const RestMesh& rest) : rest_(rest) {
@@ -190,14 +190,15 @@ class SurfacePlaces {
     return sum > 0.5F;
   }
 
-  // The vertex of the parts that lies farthest along `direction` in the slice around x.
+  // Returns the vertex of the parts that lies farthest along `direction` in the slice around x.
   template <std::size_t N>
   int extreme(float x, const std::array<Joints, N>& parts, const Eigen::Vector3f& direction) const {
     int best = -1;
     float best_score = -std::numeric_limits<float>::infinity();
     for (std::size_t v = 0; v < rest_.vertices.size(); ++v) {
       if (!belongs(v, parts)) continue;
-      // Two units of reach are given up for one unit off the slice; the middle line wins over the sides.
+      // One unit of distance from the slice costs as much as two units of reach, and the middle line is
+      // preferred to the sides.
       const Eigen::Vector3f& p = rest_.vertices[v];
       const float side = direction.z() == 0.0F ? 0.5F * std::abs(p.z()) : 0.0F;
       const float score = direction.dot(p) - 2.0F * std::abs(p.x() - x) - side;
@@ -222,7 +223,7 @@ class SurfacePlaces {
     return static_cast<int>(found - rest_.vertices.begin());
   }
 
-  // The tip of a limb that one joint moves: the vertex farthest from the head's middle.
+  // Returns the tip of a limb that one joint moves, which is its vertex farthest from the head's middle.
   int farthest_of_joint(int joint) const {
     const Eigen::Vector3f from = 0.5F * (at("left_eye") + at("right_eye"));
     int best = -1;
@@ -243,7 +244,7 @@ class SurfacePlaces {
   std::map<std::string, int> vertex_;
 };
 
-// left <-> right in a name, whatever its case.
+// Exchanges left and right in a name, whatever its case.
 std::string mirrored(std::string name) {
   for (const auto& [from, to] : {std::pair<std::string_view, std::string_view>{"left", "right"},
                                  {"right", "left"},

@@ -1,5 +1,5 @@
-// The keypoints of the datasets as places on the body: SMAL's own 26, and the points that only SuperAnimal's
-// 39 or Animal Kingdom's 23 have.
+// Gives the keypoints of the datasets as places on the body: SMAL's own 26, and the points that only
+// SuperAnimal's 39 or Animal Kingdom's 23 have.
 #pragma once
 
 #include <Eigen/Core>
@@ -24,8 +24,8 @@ std::vector<Landmark> animal3d_landmarks(const RestMesh& rest);        // 26
 std::vector<Landmark> superanimal_landmarks(const RestMesh& rest);     // 39
 std::vector<Landmark> animal_kingdom_landmarks(const RestMesh& rest);  // 23
 
-// Returns where the landmarks are on a body, in the camera frame without translation. A landmark that does
-// not exist is at (0, 0, 0).
+// Returns the positions of the landmarks on a body, in the camera frame without translation. A landmark that
+// does not exist is at (0, 0, 0).
 std::vector<Eigen::Vector3f> landmark_points(const std::vector<Landmark>& landmarks, const Body& body);
 
 }  // namespace q3d::pipeline::world

@@ -26,7 +26,7 @@ void smear(cv::Mat& picture, manifests::Rng& rng) {
   cv::filter2D(picture, picture, -1, kernel);
 }
 
-// Contrast, exposure and white balance, one curve a channel.
+// Applies contrast, exposure and white balance, with one curve for each channel.
 void grade(cv::Mat& picture, const LensHabits& habits, manifests::Rng& rng) {
   const double contrast = habits.contrast * std::exp(rng.normal(0.0, 0.08));
   const double brightness = rng.normal(0.0, 8.0);
@@ -55,7 +55,7 @@ void grade(cv::Mat& picture, const LensHabits& habits, manifests::Rng& rng) {
   }
 }
 
-// A camera trap's night picture: no colour, a bright middle and dark corners.
+// Makes a camera trap's night picture, with no colour, a bright middle and dark corners.
 void infrared(cv::Mat& picture, manifests::Rng& rng) {
   const double reach = rng.uniform(0.6, 1.1);
   const cv::Point2d middle(picture.cols * rng.uniform(0.4, 0.6), picture.rows * rng.uniform(0.4, 0.7));

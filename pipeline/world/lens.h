@@ -1,4 +1,4 @@
-// A lens applies what a camera does to a picture, and what its owner does to it afterwards.
+// A lens applies the effects of a camera, and of later editing, to a picture.
 #pragma once
 
 #include <cstdint>
@@ -20,11 +20,11 @@ struct LensHabits {
   int quality_low = 75, quality_high = 95;  // JPEG
 };
 
-// Changes the picture (BGR, 8 bit) in place. Returns the bar that the camera has stamped over it, or an empty
-// one.
+// Changes the picture (BGR, 8 bit) in place. Returns the rectangle of the bar that the camera has stamped
+// over it, or an empty one.
 cv::Rect expose(cv::Mat& picture, const LensHabits& habits, manifests::Rng& rng);
 
-// JPEG bytes. Throws std::runtime_error when the encoder fails.
+// Returns JPEG bytes. Throws std::runtime_error if the encoder fails.
 std::vector<std::uint8_t> encode_jpeg(const cv::Mat& picture, const LensHabits& habits, manifests::Rng& rng);
 
 }  // namespace q3d::pipeline::world

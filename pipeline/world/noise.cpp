@@ -10,7 +10,8 @@
 namespace q3d::pipeline::world {
 namespace {
 
-// std::floor is a library call on the oldest processors that we build for, and this is the hottest place.
+// This replaces std::floor, which is a library call on the oldest supported processors, in the most
+// time-critical function.
 int floor_of(float x) {
   const int truncated = static_cast<int>(x);
   return truncated - (x < static_cast<float>(truncated) ? 1 : 0);

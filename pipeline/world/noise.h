@@ -1,4 +1,4 @@
-// Smooth random fields for coats, ground and foliage.
+// Makes smooth random fields for coats, ground and foliage.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,15 +8,16 @@
 
 namespace q3d::pipeline::world {
 
-// Value noise on the integer lattice, smooth between lattice points, period 256. One field serves the whole
-// world: pictures look at different places of it.
+// Value noise on the integer lattice, smooth between lattice points, with period 256. One field serves the
+// whole world; pictures use different places of it.
 class NoiseField {
  public:
   explicit NoiseField(std::uint64_t seed);
 
   float at(float x, float y) const;          // [-1, 1]
   float at(const Eigen::Vector3f& p) const;  // [-1, 1]
-  // Sum of octaves, each of twice the frequency and half the height of the one before; about [-1, 1].
+  // Returns a sum of octaves, each with twice the frequency and half the height of the previous one; about
+  // [-1, 1].
   float octaves(float x, float y, int count) const;
   float octaves(const Eigen::Vector3f& p, int count) const;
 
@@ -24,7 +25,7 @@ class NoiseField {
     float nearest = 0.0F;     // distance to the nearest feature point, in lattice steps
     std::uint32_t label = 0;  // its random number, 0 to 255
   };
-  // Cellular noise: one jittered feature point for each lattice cube.
+  // Computes cellular noise with one jittered feature point for each lattice cube.
   Cell cell(const Eigen::Vector3f& p) const;
 
  private:

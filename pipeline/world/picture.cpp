@@ -36,7 +36,7 @@ Light draw_light(const Domain& domain, const Ground& ground, const Backdrop& bac
   const bool sunny = rng.chance(domain.sunny) && backdrop.place != Place::room;
   const double high = rng.uniform(22.0, 75.0) * std::numbers::pi / 180.0;
   const double around = rng.uniform(0.0, 2.0 * std::numbers::pi);
-  // Mostly from the photographer's side of the animal.
+  // The sun is mostly on the photographer's side of the animal.
   Eigen::Vector3f level(static_cast<float>(std::cos(around)), 0.0F, static_cast<float>(std::sin(around)));
   if (level.z() > 0.0F && rng.chance(0.7)) level.z() = -level.z();
   const Eigen::Vector3f along = (level - level.dot(ground.up) * ground.up).normalized();

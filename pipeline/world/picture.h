@@ -1,4 +1,4 @@
-// Makes a picture from a plan, and states everything that is true of it.
+// Makes a picture from a plan, with its full truth.
 #pragma once
 
 #include <array>

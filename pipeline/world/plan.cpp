@@ -22,7 +22,8 @@ std::string with_underscores(std::string_view name) {
   return result;
 }
 
-// COCO's classes among ours; some pictures of Animal3D come from there, all of those that ImageNet lacks.
+// Returns the COCO class of a species. Some pictures of Animal3D come from COCO, including all species that
+// ImageNet lacks.
 std::string_view coco_class(const Species& species) {
   if (species.name == "horse" || species.name == "zebra" || species.name == "cow" ||
       species.name == "sheep") {
@@ -31,7 +32,8 @@ std::string_view coco_class(const Species& species) {
   return "";
 }
 
-// Numbers are apart for every set and split, so that no two files seem to be the same photograph.
+// Returns a file name. The numbers of each set and split differ, so that no two files seem to be the same
+// photograph.
 std::string animal3d_name(const PicturePlan& plan, const Species& species, manifests::Rng& rng) {
   const std::string folder =
       fmt::format("images/{}/{}", plan.test ? "test" : "train", with_underscores(species.name));
@@ -48,7 +50,7 @@ std::string ctrlani3d_name(const PicturePlan& plan, const Species& species) {
                      2 * plan.index + (plan.test ? 1 : 0));
 }
 
-// Animal Kingdom's films have names of eight letters, frames have numbers.
+// Returns a file name as in Animal Kingdom, where films have names of eight letters and frames have numbers.
 std::string kingdom_name(const PicturePlan& plan, std::uint64_t seed) {
   manifests::Rng film(
       seed, {static_cast<std::uint64_t>(plan.set), naming, static_cast<std::uint64_t>(plan.individual)});

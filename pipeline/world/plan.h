@@ -24,10 +24,11 @@ struct PicturePlan {
   std::string mask;    // path below the world's folder: hidden from the sets that have no masks
 };
 
-// Pictures of one split in file order. `share` scales the counts; a count that is not zero stays at least 1.
+// Returns the pictures of one split in file order. `share` scales the counts; a count that is not zero stays
+// at least 1.
 std::vector<PicturePlan> plan_split(SetId set, bool test, double share, std::uint64_t seed);
 
-// `total` things shared out in proportion to the weights by largest remainders; the sum is exactly `total`.
+// Distributes `total` things in proportion to the weights by largest remainders. The sum is exactly `total`.
 std::vector<int> share_out(int total, const std::vector<double>& weights);
 
 }  // namespace q3d::pipeline::world

@@ -1,4 +1,4 @@
-// Plain geometry of one picture, in the camera frame of the network: x right, y down, z forward, SMAL units.
+// The geometry of one picture, in the camera frame of the network: x right, y down, z forward, SMAL units.
 #pragma once
 
 #include <Eigen/Core>
@@ -34,7 +34,7 @@ struct Ground {
   Eigen::Vector3f up{0.0F, -1.0F, 0.0F};
   float level = -1.0F;
 
-  // The multiple of `ray` that lies on the ground, or a negative number when the ray goes to the sky.
+  // Returns the multiple of `ray` that lies on the ground, or a negative number if the ray goes to the sky.
   float hit(const Eigen::Vector3f& ray) const {
     const float fall = up.dot(ray);
     return fall < -1e-4F ? level / fall : -1.0F;
@@ -46,7 +46,7 @@ struct Light {
   Colour sun{1.0F, 1.0F, 1.0F};               // linear light, not screen values
   Colour sky{0.5F, 0.5F, 0.5F};               // from above
   Colour bounce{0.3F, 0.3F, 0.3F};            // from the ground
-  float ground_shadow = 0.5F;                 // how much of the ground's brightness the sun's shadow takes
+  float ground_shadow = 0.5F;  // fraction of the ground's brightness that the sun's shadow removes
 };
 
 }  // namespace q3d::pipeline::world

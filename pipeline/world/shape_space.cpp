@@ -9,10 +9,10 @@
 namespace q3d::pipeline::world {
 namespace {
 
-constexpr double kIndividual = 0.5;  // deviation of an individual from its species, in those of the family
-constexpr double kFarthest = 3.0;    // of a species from its family, in those of the family
+constexpr double kIndividual = 0.5;  // deviation of individuals from the species, in the family's deviations
+constexpr double kFarthest = 3.0;    // largest distance of a species from its family, in such deviations
 
-// SMAL keypoints that end the measured parts.
+// The SMAL keypoints at the ends of the measured parts.
 enum Keypoint {
   left_eye = 0,
   left_front_paw = 3,
@@ -27,7 +27,7 @@ enum Keypoint {
   nose = 24
 };
 
-// One wanted change for each of ShapeSpace's lengths, in the same order.
+// Returns one wanted change for each of ShapeSpace's lengths, in the same order.
 Eigen::VectorXd wanted_changes(const Build& build) {
   Eigen::VectorXd changes(8);
   changes << build.legs, build.legs, build.neck, build.girth, build.girth, build.head, build.ears, build.tail;
@@ -99,7 +99,7 @@ Eigen::VectorXd ShapeSpace::typical(const Species& species) const {
   const Eigen::VectorXd mean = family_means_.row(static_cast<int>(species.family)).transpose();
   const Eigen::MatrixXd& factor = family_factors_[static_cast<std::size_t>(species.family)];
   const Eigen::VectorXd wanted = wanted_changes(species.build);
-  // Relative change of each length for one deviation of each measure, at the family's mean.
+  // The relative change of each length for one deviation of each measure, at the family's mean.
   Eigen::MatrixXd slope(wanted.size(), factor.rows());
   for (Eigen::Index i = 0; i < wanted.size(); ++i) {
     const Length& length = lengths_[static_cast<std::size_t>(i)];
@@ -109,7 +109,7 @@ Eigen::VectorXd ShapeSpace::typical(const Species& species) const {
         span.transpose() * (length.to_directions - length.from_directions) / span.squaredNorm();
     slope.row(i) = gradient * factor.transpose();
   }
-  // The ridge keeps builds that the space cannot quite give from exploding.
+  // The ridge keeps the solution small for builds that the space cannot represent exactly.
   const Eigen::MatrixXd gram =
       slope * slope.transpose() + 1e-4 * Eigen::MatrixXd::Identity(wanted.size(), wanted.size());
   const Eigen::VectorXd measures = slope.transpose() * gram.ldlt().solve(wanted);

@@ -1,4 +1,4 @@
-// Species as regions of SMAL's shape space.
+// Represents species as regions of SMAL's shape space.
 #pragma once
 
 #include <Eigen/Core>
@@ -18,11 +18,11 @@ class ShapeSpace {
   ShapeSpace(const RestMesh& rest, Eigen::MatrixXd shape_directions, Eigen::MatrixXd family_means,
              std::vector<Eigen::MatrixXd> family_factors);
 
-  // The middle of a species: its family's mean and the likeliest change of the measures that gives its build,
-  // to first order. No measure moves by more than three deviations.
+  // Returns the betas of a typical animal of a species: its family's mean, changed by the likeliest measures
+  // that give its build, to first order. No measure changes by more than three deviations.
   Eigen::VectorXd typical(const Species& species) const;
 
-  // An individual: about the typical one, at half the family's deviations.
+  // Draws an individual around the typical one, with half the family's deviations.
   std::array<float, smal::kNumBetas> draw(const Species& species, manifests::Rng& rng) const;
 
  private:

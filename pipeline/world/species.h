@@ -1,4 +1,4 @@
-// The animals of the world: regions of shape space with their coats and how often each dataset shows them.
+// The species of the world, with their build, their coats and their frequency in each dataset.
 #pragma once
 
 #include <array>
@@ -25,7 +25,7 @@ struct Build {
   float tail = 0.0F;
 };
 
-// Relative frequency in each dataset; 0 = does not occur.
+// The relative frequency in each dataset; 0 means that the species does not occur.
 struct Frequency {
   double animal3d = 0.0, ctrlani3d = 0.0, superanimal = 0.0, animal_kingdom = 0.0;
 };
@@ -34,7 +34,7 @@ struct Species {
   std::string_view name;  // lower case, spaces
   Family family;
   std::string_view synset;        // WordNet number, the first part of an ImageNet file name
-  std::string_view kingdom_name;  // what Animal Kingdom calls it, and the group it puts it in
+  std::string_view kingdom_name;  // its name and its group in Animal Kingdom
   std::string_view kingdom_group;
   Frequency frequency;
   Build build;
@@ -43,7 +43,7 @@ struct Species {
 
 std::span<const Species> species_table();
 
-// An individual's coat: one of the species' variants with its own shade.
+// Draws an individual's coat, which is one of the species' variants with its own shade.
 Coat draw_coat(const Species& species, manifests::Rng& rng);
 
 }  // namespace q3d::pipeline::world

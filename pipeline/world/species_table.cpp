@@ -6,8 +6,8 @@
 namespace q3d::pipeline::world {
 namespace {
 
-// A row: name, family, synset, Animal Kingdom's name and group, frequency in the order of Frequency, build in
-// the order of Build, coats. Colours and builds are chosen by eye.
+// A row has name, family, synset, Animal Kingdom's name and group, frequency in the order of Frequency, build
+// in the order of Build, coats. Colours and builds are chosen by eye.
 //
 // Frequencies of Animal3D run from 39 to 1, as in the paper's figure (sorrel horses 710, cougars 18);
 // SuperAnimal is flatter and has species that Animal3D lacks; Animal Kingdom leans to wild animals.
@@ -21,7 +21,7 @@ constexpr std::string_view kPigs = "Pig / Boar / Hog";
 
 const Colour kBlack = rgb(30, 27, 26), kWhite = rgb(232, 228, 220), kDark = rgb(58, 46, 38);
 
-// A coat of one colour; the belly a little lighter.
+// Returns a coat of one colour with a slightly lighter belly.
 Coat fur(const Colour& back) {
   Coat coat;
   coat.back = back;

@@ -35,12 +35,13 @@ class Posing {
   void bend(int joint, double degrees) { turn(joint, 2, degrees); }
   double about(double mean, double deviation) { return rng_.normal(mean, deviation); }
 
-  // One leg's joints in turn, degrees about z, each a little off.
+  // Turns one leg's joints by the given degrees about z, each with a random deviation.
   void leg(int first, const double (&degrees)[kLegJoints], double deviation) {
     for (int i = 0; i < kLegJoints; ++i) bend(first + i, about(degrees[i], deviation));
   }
 
-  // A pose of the prior, its distance from the mean scaled; the legs only if wanted.
+  // Adds a pose of the prior, with its distance from the mean scaled, and with the legs only if `legs` is
+  // true.
   void add_motion(double spread, bool legs);
 
  private:

@@ -14,8 +14,8 @@ Eigen::Matrix3d about(const Eigen::Vector3d& axis, double radians) {
   return Eigen::AngleAxisd(radians, axis).toRotationMatrix();
 }
 
-// Turn about the vertical between the animal's axis and the picture: 0 = seen from its right, head to the
-// right.
+// Draws the angle about the vertical between the animal's axis and the picture. At 0 the animal is seen from
+// its right, with its head to the right.
 double draw_yaw(double side_view, manifests::Rng& rng) {
   const double side = rng.chance(0.5) ? 0.0 : std::numbers::pi;
   return rng.chance(side_view) ? side + rng.normal(0.0, 26.0) * kDegree
@@ -47,8 +47,8 @@ Subject draw_subject(const Species& species, const Domain& domain, const ShapeSp
   subject.posture.pose = stance.pose;
   subject.lift = stance.lift;
 
-  // Body (x to the head, y up, z right) -> camera (x right, y down, z forward), seen from the right at yaw 0;
-  // then the camera goes up by `high` and tilts by `roll`.
+  // Map body axes (x to the head, y up, z right) to camera axes (x right, y down, z forward). At yaw 0 the
+  // animal is seen from its right. Then the camera moves up by `high` and tilts by `roll`.
   const Eigen::Vector3d x = Eigen::Vector3d::UnitX(), y = Eigen::Vector3d::UnitY(),
                         z = Eigen::Vector3d::UnitZ();
   const double high =

@@ -12,7 +12,7 @@ namespace {
 
 enum Row { awa = 0, ap10k, animalpose, stanford_dogs, cheetah, horse };
 
-// SuperAnimal's indices by collection (DeepLabCut's conversion table).
+// These give SuperAnimal's indices by collection, from DeepLabCut's conversion table.
 std::vector<int> all_but_antlers() {
   std::vector<int> points;
   for (int i = 0; i < 39; ++i) {

@@ -1,5 +1,5 @@
-// The collections that make up SuperAnimal-Quadruped: each labels its own part of the 39 keypoints and has
-// its own habits of naming, boxes and codes for a missing point.
+// The collections that make up SuperAnimal-Quadruped. Each labels its own part of the 39 keypoints, and has
+// its own conventions for names, boxes and missing points.
 #pragma once
 
 #include <span>
@@ -22,11 +22,11 @@ struct SuperAnimalSource {
 
 std::span<const SuperAnimalSource> superanimal_sources();
 
-// Row of superanimal_sources() for one more picture of a species.
+// Draws the row of superanimal_sources() for another picture of a species.
 int draw_source(const Species& species, manifests::Rng& rng);
 
-// The file's name as the collection and SuperAnimal's converter make it: "<stem>_<image id>.jpg"; for some
-// collections with the folder, even the whole path, of the machine that converted it.
+// Returns the file's name as the collection and SuperAnimal's converter make it: "<stem>_<image id>.jpg". For
+// some collections it includes the folder, or even the whole path, on the machine that converted it.
 std::string source_file_name(int source, const Species& species, int image_id, manifests::Rng& rng);
 
 }  // namespace q3d::pipeline::world

@@ -27,7 +27,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kVersion = 1;  // of what the same options give
+constexpr int kVersion = 1;  // raise it when the same options give another world
 constexpr int kChunk = 64;   // pictures whose bodies are computed together
 constexpr const char* kUnfinished = ".unfinished-world";
 constexpr std::array<const char*, 6> kFolders{
@@ -53,7 +53,7 @@ nlohmann::json options_of(const WorldOptions& options) {
           {"share", options.share}};
 }
 
-// Reads what an earlier run left. Returns its counts if it is the same world and finished.
+// Reads the results of an earlier run. Returns its counts if it is the same world and finished.
 std::optional<nlohmann::json> finished_world(const WorldOptions& options) {
   const fs::path file = options.out / "world.json";
   if (!fs::exists(file)) return std::nullopt;
@@ -69,7 +69,7 @@ std::optional<nlohmann::json> finished_world(const WorldOptions& options) {
   return found.at("pictures");
 }
 
-// Removes an unfinished world. Folders that no run of ours has marked as its own are never touched.
+// Removes an unfinished world. Folders without the mark of this program are never touched.
 void clear_unfinished(const fs::path& out) {
   const fs::path marker = out / kUnfinished;
   for (const char* folder : kFolders) {
@@ -84,12 +84,12 @@ void clear_unfinished(const fs::path& out) {
   manifests::write_file_atomically(marker, "a killed run of the world's renderer is made anew\n");
 }
 
-// A power cut after this must not bring the mark back.
+// Removes the mark durably, so that a power cut cannot bring it back.
 void remove_mark(const fs::path& out) {
   if (fs::remove(out / kUnfinished)) manifests::sync_folder(out);
 }
 
-// The end of make_world syncs all pictures at once, which is quicker than one by one.
+// Writes without a sync. make_world() syncs all pictures at its end, which is faster than one by one.
 void write_bytes(const fs::path& path, std::span<const std::uint8_t> bytes) {
   manifests::FileDescriptor file(path, O_WRONLY | O_CREAT | O_TRUNC);
   file.write_all(std::as_bytes(bytes));
@@ -106,7 +106,7 @@ void save_asset(const BodyModel& model, const fs::path& path) {
   model.save(path);
 }
 
-// The priors of the world's bodies, for the guards and trust scores that need them.
+// Saves the priors of the world's bodies, for the guards and trust scores that need them.
 void save_priors(const fs::path& out) {
   const fs::path path = out / "assets" / "priors_synthetic.safetensors";
   if (fs::exists(path)) return;
@@ -216,7 +216,7 @@ WorldSummary make_world(const WorldOptions& options) {
     for (const auto& [split, count] : summary.pictures) summary.total += count;
     if (!fs::exists(asset)) save_asset(BodyModel(), asset);
     save_priors(options.out);
-    remove_mark(options.out);  // the run that finished the world was killed before it came to that
+    remove_mark(options.out);  // the run that finished the world was killed before this step
     return summary;
   }
   clear_unfinished(options.out);

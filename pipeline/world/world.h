@@ -24,7 +24,7 @@ struct WorldOptions {
   int picture_px = 320;         // longer side of a photograph; Animal Kingdom's frames are twice as wide
   double share = 1.0;           // of the default number of pictures, 5,000
   int threads = 0;              // 0 = one for each core; never changes a byte
-  std::filesystem::path asset;  // where the body model goes; empty = below out
+  std::filesystem::path asset;  // file for the body model; empty = below out
   std::function<void(int done, int total)> progress;  // called from the calling thread
 };
 
@@ -35,9 +35,9 @@ struct WorldSummary {
   std::filesystem::path asset;
 };
 
-// Renders the world into options.out. A folder that holds a finished world of the same options is left as it
-// is; what a killed run left is made anew. Throws std::invalid_argument on options out of range and
-// std::runtime_error when the folder holds anything else, is in use or cannot be written.
+// Renders the world into options.out. A folder that holds a finished world of the same options is left
+// unchanged; an unfinished world of a killed run is made anew. Throws std::invalid_argument for options out
+// of range and std::runtime_error if the folder holds anything else, is in use or cannot be written.
 WorldSummary make_world(const WorldOptions& options);
 
 }  // namespace q3d::pipeline::world

@@ -18,7 +18,7 @@ std::string shape_text(const std::vector<std::int64_t>& sizes) {
   return text + ")";
 }
 
-// Names the asset in every message.
+// Checks the parts of an asset. Every message names the asset.
 class AssetChecker {
  public:
   AssetChecker(const SmalAsset& asset, const std::string& where) : asset_(asset), where_(where) {}
@@ -124,7 +124,7 @@ class AssetChecker {
   const std::string& where_;
 };
 
-// 26 groups as one list and 27 offsets into it, which is how the file holds them.
+// Returns the 26 groups as one list and 27 offsets into it, which is the form in the file.
 std::pair<torch::Tensor, torch::Tensor> flatten(const std::vector<std::vector<std::int64_t>>& groups) {
   std::vector<std::int64_t> flat;
   std::vector<std::int64_t> offsets = {0};

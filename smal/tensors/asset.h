@@ -26,12 +26,12 @@ struct SmalAsset {
   std::string licence;
 };
 
-// Throws std::runtime_error naming the tensor, got and expected: shapes, dtypes, kinematic tree (a root, no
-// cycle, parents before children), weights and regressor rows that sum to 1, indices in range, finite
-// numbers.
+// Checks shapes, dtypes, the kinematic tree (a root, no cycle, parents before children), that the rows of
+// weights and regressor sum to 1, that indices are in range, and that all numbers are finite. Throws
+// std::runtime_error that names the tensor, what was found and what was expected.
 void check_asset(const SmalAsset& asset, const std::string& where);
 
-// Reads and checks. Throws std::runtime_error.
+// Reads an asset and checks it (check_asset). Throws std::runtime_error.
 SmalAsset load_asset(const std::filesystem::path& path);
 void save_asset(const std::filesystem::path& path, const SmalAsset& asset);
 

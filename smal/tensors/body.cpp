@@ -55,8 +55,8 @@ KinematicTree make_tree(const torch::Tensor& parents, torch::Device device) {
   return tree;
 }
 
-// joints (B, 35, 3) at rest, rotations (B, 35, 3, 3) relative to the parent -> the motion of each joint's
-// frame from its rest place at `joints` (translation = posed joint).
+// Returns the motion of each joint's frame from its rest position; its translation is the posed joint.
+// joints: (B, 35, 3) at rest; rotations: (B, 35, 3, 3), relative to the parent.
 JointMotion pose_tree(const KinematicTree& tree, const torch::Tensor& rotations,
                       const torch::Tensor& joints) {
   std::vector<torch::Tensor> level_rotations = {rotations.narrow(1, 0, 1)};
@@ -73,7 +73,7 @@ JointMotion pose_tree(const KinematicTree& tree, const torch::Tensor& rotations,
           torch::cat(level_positions, 1).index_select(1, tree.order)};
 }
 
-// Everything about a vertex but its pose.
+// The model's data for n vertices.
 struct VertexSet {
   torch::Tensor rest;       // (n, 3)
   torch::Tensor shapedirs;  // (3 n, 41)
@@ -91,7 +91,7 @@ VertexSet some_vertices(const SmalAsset& asset, const torch::Tensor& index) {
           asset.lbs_weights.index_select(0, index)};
 }
 
-// Blend shapes, then skinning: (B, n, 3).
+// Applies the blend shapes and then skinning. Returns (B, n, 3).
 torch::Tensor posed_vertices(const VertexSet& set, const torch::Tensor& pose_feature,
                              const torch::Tensor& betas, const JointMotion& skinning) {
   const std::int64_t batch = betas.size(0);
@@ -104,7 +104,7 @@ torch::Tensor posed_vertices(const VertexSet& set, const torch::Tensor& pose_fea
   return torch::matmul(rotation, shaped.unsqueeze(-1)).squeeze(-1) + translation;
 }
 
-// Every vertex that some keypoint needs, ascending.
+// Returns every vertex that some keypoint needs, in ascending order.
 std::vector<std::int64_t> used_vertices(const std::vector<std::vector<std::int64_t>>& groups) {
   std::vector<std::int64_t> used;
   for (const auto& group : groups) used.insert(used.end(), group.begin(), group.end());
@@ -113,7 +113,8 @@ std::vector<std::int64_t> used_vertices(const std::vector<std::vector<std::int64
   return used;
 }
 
-// (26, U): row k averages the vertices of group k. A vertex listed twice counts twice, as in a mean.
+// Returns a matrix (26, U) whose row k averages the vertices of group k. A vertex that is listed twice counts
+// twice.
 torch::Tensor group_means(const std::vector<std::vector<std::int64_t>>& groups,
                           const std::vector<std::int64_t>& used) {
   torch::Tensor means =
@@ -157,7 +158,8 @@ struct SmalBody::Rig {
     used = some_vertices(asset, used_index);
   }
 
-  // The motion of each joint, and the same as skinning needs it: from the rest shape of these betas.
+  // Returns the motion of each joint, and the same motion in the form that skinning needs, which starts from
+  // the rest shape of these betas.
   std::pair<JointMotion, JointMotion> move_joints(const torch::Tensor& rotations,
                                                   const torch::Tensor& betas) const {
     const torch::Tensor joints =
@@ -180,7 +182,7 @@ SmalAsset convert(SmalAsset asset, torch::Device device, torch::ScalarType dtype
   return asset;
 }
 
-// The rotations relative to the identity, without the root: (B, 306).
+// Returns the rotations minus the identity, without the root: (B, 306).
 torch::Tensor pose_feature(const torch::Tensor& rotations) {
   return (rotations.narrow(1, 1, kNumJoints - 1) - torch::eye(3, rotations.options())).flatten(1);
 }

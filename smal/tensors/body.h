@@ -19,16 +19,16 @@ struct BodyOutput {
 // smal_wrapper.SMAL.forward). Immutable after construction; forward is thread-safe.
 class SmalBody {
  public:
-  // Throws std::runtime_error when check_asset refuses the asset.
+  // Throws std::runtime_error if check_asset refuses the asset.
   explicit SmalBody(SmalAsset asset, torch::Device device = torch::kCPU);
 
-  // rotations (B, 35, 3, 3), betas (B, 41), transl (B, 3) or undefined; float32 (or float64 after to_dtype).
-  // Throws std::invalid_argument on another shape.
+  // Returns the posed bodies. rotations: (B, 35, 3, 3); betas: (B, 41); transl: (B, 3) or undefined; all
+  // float32 (or float64 after to_dtype). Throws std::invalid_argument for another shape.
   BodyOutput forward(const torch::Tensor& rotations, const torch::Tensor& betas,
                      const torch::Tensor& transl = {}) const;
 
-  // The 26 keypoints alone, from the few vertices that carry them: the same numbers as forward().keypoints to
-  // rounding, at a fraction of the cost. (B, 26, 3).
+  // Returns the 26 keypoints alone, (B, 26, 3), from the few vertices that they depend on. The numbers equal
+  // forward().keypoints up to rounding, at a fraction of the cost.
   torch::Tensor keypoints(const torch::Tensor& rotations, const torch::Tensor& betas,
                           const torch::Tensor& transl = {}) const;
 
@@ -38,7 +38,7 @@ class SmalBody {
   SmalBody to_dtype(torch::ScalarType dtype) const;
 
  private:
-  struct Rig;  // what the asset's tensors look like to the arithmetic
+  struct Rig;  // the asset's tensors in the form that the arithmetic needs
   SmalAsset asset_;
   std::shared_ptr<const Rig> rig_;
 };

@@ -5,7 +5,7 @@
 namespace q3d::smal::tensors {
 namespace {
 
-constexpr double kScaleGuard = 1e-9;  // the official code's; s itself is not clamped
+constexpr double kScaleGuard = 1e-9;  // as in the official code; s itself is not clamped
 
 }  // namespace
 

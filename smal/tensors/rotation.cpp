@@ -8,12 +8,12 @@ namespace {
 using torch::indexing::Ellipsis;
 using torch::indexing::Slice;
 
-// Length along the last axis, kept as an axis of size 1 and at least `floor`.
+// Returns the length along the last axis, at least `floor`. The axis is kept with size 1.
 torch::Tensor length(const torch::Tensor& vectors, double floor = 0.0) {
   return torch::linalg_vector_norm(vectors, 2, {-1}, true).clamp_min(floor);
 }
 
-// (..., 4) unit quaternion (w, x, y, z) -> (..., 3, 3).
+// Converts unit quaternions (..., 4), in the order (w, x, y, z), to matrices (..., 3, 3).
 torch::Tensor quaternion_to_matrix(const torch::Tensor& quaternion) {
   const auto parts = quaternion.unbind(-1);
   const torch::Tensor &w = parts[0], &x = parts[1], &y = parts[2], &z = parts[3];
@@ -25,14 +25,15 @@ torch::Tensor quaternion_to_matrix(const torch::Tensor& quaternion) {
   return rows.unflatten(-1, {3, 3});
 }
 
-// (..., 3, 3) -> (..., 3): twice the vector of the antisymmetric part.
+// Returns twice the vector of the antisymmetric part of matrices: (..., 3, 3) -> (..., 3).
 torch::Tensor antisymmetric_vector(const torch::Tensor& matrix) {
   const auto at = [&matrix](int row, int column) { return matrix.index({Ellipsis, row, column}); };
   return torch::stack({at(2, 1) - at(1, 2), at(0, 2) - at(2, 0), at(1, 0) - at(0, 1)}, -1);
 }
 
-// (..., 3, 3) -> (..., 4) unit quaternion (w, x, y, z) with w >= 0. Each row of 4 q q^T is a multiple of q;
-// the row with the largest diagonal element is at least 1 long, so its normalisation is smooth.
+// Converts matrices (..., 3, 3) to unit quaternions (..., 4), in the order (w, x, y, z) with w >= 0. Each row
+// of 4 q q^T is a multiple of q; the row with the largest diagonal element is at least 1 long, so its
+// normalisation is smooth.
 torch::Tensor matrix_to_quaternion(const torch::Tensor& matrix) {
   const auto at = [&matrix](int row, int column) { return matrix.index({Ellipsis, row, column}); };
   const torch::Tensor xx = at(0, 0), yy = at(1, 1), zz = at(2, 2);
@@ -82,7 +83,8 @@ torch::Tensor axis_angle_to_matrix(const torch::Tensor& axis_angle) {
 torch::Tensor axis_angle_to_matrix_exact(const torch::Tensor& axis_angle) {
   expect_trailing(axis_angle, "axis_angle_to_matrix_exact", "axis_angle", {3});
   // R = I + (sin t / t) K + ((1 - cos t) / t^2) K^2 with K the cross-product matrix. torch's sinc is smooth
-  // at 0, and (1 - cos t) / t^2 = (sin(t/2) / (t/2))^2 / 2 has no cancellation, so no case for small angles.
+  // at 0, and (1 - cos t) / t^2 = (sin(t/2) / (t/2))^2 / 2 has no cancellation, so small angles need no
+  // special case.
   const torch::Tensor angle = length(axis_angle).unsqueeze(-1);
   const torch::Tensor first = torch::sinc(angle / M_PI);
   const torch::Tensor second = 0.5 * torch::sinc(angle / (2.0 * M_PI)).square();
@@ -108,7 +110,8 @@ torch::Tensor matrix_to_axis_angle_smooth(const torch::Tensor& matrix) {
   const torch::Tensor cosine = quaternion.index({Ellipsis, Slice(0, 1)});
   const torch::Tensor sine_axis = quaternion.index({Ellipsis, Slice(1, 4)});
   const torch::Tensor squared = sine_axis.square().sum(-1, true);
-  // angle / sin(angle / 2) from its series where the quotient's gradient would divide zero by zero.
+  // For small angles, angle / sin(angle / 2) comes from its series, because the quotient's gradient would
+  // divide zero by zero.
   const torch::Tensor is_small = squared < 1e-4;
   const torch::Tensor sine = torch::where(is_small, torch::ones_like(squared), squared).sqrt();
   const torch::Tensor quotient = 2.0 * torch::atan2(sine, cosine) / sine;

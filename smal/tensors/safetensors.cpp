@@ -29,8 +29,8 @@ std::string system_reason() {
   return std::strerror(errno);
 }
 
-// A pickle starts with 0x80 and its protocol, 2 to 5. So may the length of a header, which then starts with a
-// brace.
+// A pickle starts with 0x80 and its protocol, 2 to 5. The length of a safetensors header may start with the
+// same bytes, but a brace follows it.
 bool is_pickle(std::string_view content) {
   const bool has_header = content.size() > kLengthBytes && content[kLengthBytes] == '{';
   return content.size() >= 2 && content[0] == '\x80' && content[1] >= 2 && content[1] <= 5 && !has_header;
@@ -80,7 +80,7 @@ struct SafeTensors::Mapping {
   }
 
   void map_file() {
-    // O_NONBLOCK: opening a named pipe would otherwise wait for a writer.
+    // O_NONBLOCK is set because opening a named pipe would otherwise wait for a writer.
     const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
     if (file.get() < 0) throw std::runtime_error("cannot open: " + system_reason());
     struct stat status {};

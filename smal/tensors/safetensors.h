@@ -1,4 +1,4 @@
-// safetensors files: memory-mapped reading and atomic writing.
+// Reads safetensors files through a memory mapping and writes them atomically.
 #pragma once
 
 #include <torch/types.h>
@@ -15,16 +15,17 @@ namespace q3d::smal::tensors {
 // A read-only mapping. Tensors share the mapped pages and keep the mapping alive.
 class SafeTensors {
  public:
-  // Throws std::runtime_error naming path, entry, got and expected: not a safetensors file, truncated,
-  // offsets that overlap, leave holes or point outside, unknown dtype, shape that disagrees with the byte
-  // count.
+  // Throws std::runtime_error that names path and entry, what was found and what was expected, if the file is
+  // not a safetensors file or is truncated, if offsets overlap, leave holes or point outside, for an unknown
+  // dtype, and for a shape that disagrees with the byte count.
   static SafeTensors open(const std::filesystem::path& path);
 
   const std::filesystem::path& path() const;
   const std::map<std::string, std::string>& metadata() const;
   std::vector<std::string> names() const;  // sorted
   bool contains(const std::string& name) const;
-  // CPU tensor over the mapping: do not write to it. Throws std::runtime_error when the name is absent.
+  // Returns a CPU tensor over the mapping; do not write to it. Throws std::runtime_error if the name is
+  // absent.
   torch::Tensor tensor(const std::string& name) const;
 
  private:

@@ -35,8 +35,8 @@ torch::ScalarType parse_dtype(const json& value) {
                            ", expected F64, F32, F16, BF16, I64, I32, I16, I8, U8 or BOOL");
 }
 
-// Bytes that a tensor of this shape takes. Zero sizes count as one for the overflow check, because LibTorch
-// multiplies the others into strides.
+// Returns the number of bytes that a tensor of this shape takes. Zero sizes count as one for the overflow
+// check, because LibTorch multiplies the others into strides.
 std::uint64_t byte_count(const std::vector<std::int64_t>& shape, torch::ScalarType dtype) {
   auto bound = static_cast<std::int64_t>(torch::elementSize(dtype));
   bool empty = false;
@@ -105,7 +105,7 @@ class HeaderReader {
   }
 
  private:
-  // Depth 0: the header; 1: an entry; 2: its fields; 3: the numbers of a shape or of the offsets.
+  // Depth 0 is the header, 1 an entry, 2 its fields, 3 the numbers of a shape or of the offsets.
   bool keep(int depth, json::parse_event_t event, json& parsed) {
     using Event = json::parse_event_t;
     const bool opens = event == Event::object_start || event == Event::array_start;

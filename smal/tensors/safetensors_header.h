@@ -26,15 +26,15 @@ struct TensorFileHeader {
 };
 
 // Reads the header of a file with `data_bytes` bytes behind it. Time and memory are bounded by the text's
-// length. Throws std::runtime_error naming the entry, got and expected: not a JSON object of flat objects, a
-// name twice, an unknown dtype, a shape that disagrees with the offsets, offsets that overlap, leave holes or
-// lie outside.
+// length. Throws std::runtime_error that names the entry, what was found and what was expected, if the header
+// is not a JSON object of flat objects, gives a name twice, has an unknown dtype or a shape that disagrees
+// with the offsets, or if offsets overlap, leave holes or lie outside.
 TensorFileHeader parse_header(std::span<const char> text, std::uint64_t data_bytes);
 
-// The format's name of a dtype. Throws std::runtime_error when it has none.
+// Returns the format's name of a dtype. Throws std::runtime_error if it has none.
 const char* dtype_name(torch::ScalarType dtype);
 
-// Names come from files: a message quotes no more than a bounded part of them.
+// Quotes a name for a message. Names come from files, so at most a bounded part is quoted.
 std::string quote_name(const std::string& text);
 
 }  // namespace q3d::smal::tensors

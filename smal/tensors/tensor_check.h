@@ -1,4 +1,4 @@
-// Shape and dtype checks at the doors of the public functions of smal/.
+// Checks shape and dtype of the tensors that the public functions of smal/ take.
 #pragma once
 
 #include <torch/types.h>
@@ -14,7 +14,7 @@ inline constexpr std::int64_t kAnySize = -1;
 void expect_floating(const torch::Tensor& tensor, const char* where, const char* name,
                      const std::vector<std::int64_t>& sizes);
 
-// The same for the last sizes only: any number of leading ones may come before `trailing`.
+// Checks the last sizes only: any number of leading sizes may come before `trailing`.
 void expect_trailing(const torch::Tensor& tensor, const char* where, const char* name,
                      const std::vector<std::int64_t>& trailing);
 

@@ -1,4 +1,4 @@
-// Damages files as a disk that rots does, at random places, as often as the environment says.
+// Damages files at random places, as a decaying disk does, as often as the environment says.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@
 
 namespace q3d::testing {
 
-// A number from the environment, for the long runs of `make torture`.
+// Returns a number from the environment, for the long runs of `make torture`.
 inline std::int64_t number_from_environment(const char* name, std::int64_t otherwise) {
   const char* given = std::getenv(name);
   return given != nullptr && *given != '\0' ? std::stoll(given) : otherwise;
@@ -21,7 +21,7 @@ inline std::int64_t number_from_environment(const char* name, std::int64_t other
 
 struct Damaged {
   std::string before;  // the bytes of the file
-  std::size_t at = 0;  // the first byte that is another one or gone
+  std::size_t at = 0;  // the first byte that differs or is gone
   std::string text;    // what was done
 };
 

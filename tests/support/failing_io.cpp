@@ -27,7 +27,7 @@ std::mutex mutex;
 const Plan* plan = nullptr;  // guarded by mutex
 std::atomic<int> failed = 0;
 
-// The errno that the call is to fail with; 0 when it is to pass.
+// Returns the errno with which the call must fail, or 0 if it must pass.
 int verdict(Call call, std::string_view path) {
   const std::lock_guard lock(mutex);
   if (plan == nullptr || plan->call != call || !path.ends_with(plan->ending)) return 0;

@@ -11,7 +11,7 @@ namespace q3d::testing {
 enum class Call { open, read, inspect };
 
 // While it lives, `call` on every file whose path ends in `ending` fails with errno `code`: `times` times, or
-// always when that is negative. One object at a time.
+// always if that is negative. Only one object may exist at a time.
 class FailingIo {
  public:
   FailingIo(Call call, std::string ending, int code, int times = -1);

@@ -1,4 +1,4 @@
-// The body that the golden numbers were made with.
+// Loads the body with which the golden numbers were made.
 #pragma once
 
 #include <filesystem>

@@ -13,24 +13,26 @@ inline std::filesystem::path data_dir() {
   return Q3D_TEST_DATA_DIR;
 }
 
-// The golden numbers made with the official code: Q3D_PARITY_DIR, or the project's own copy.
+// Returns the folder of the golden numbers made with the official code: Q3D_PARITY_DIR, or the project's own
+// copy.
 inline std::filesystem::path parity_dir() {
   const char* given = std::getenv("Q3D_PARITY_DIR");
   return given != nullptr && *given != '\0' ? std::filesystem::path(given) : data_dir() / "parity";
 }
 
-// The folder of what the project ships beside its code.
+// Returns the folder of the files that the project ships beside its code.
 inline std::filesystem::path source_dir() {
   return data_dir().parent_path().parent_path();
 }
 
-// Samples of the real datasets, which cannot be shipped: the folder that Q3D_SAMPLES_DIR names, or nothing.
+// Returns the folder of samples of the real datasets, which cannot be shipped: Q3D_SAMPLES_DIR, or an empty
+// path.
 inline std::filesystem::path samples_dir() {
   const char* given = std::getenv("Q3D_SAMPLES_DIR");
   return given != nullptr ? given : "";
 }
 
-// A fresh, empty folder for one test; removed when the object goes.
+// A fresh, empty folder for one test, which the destructor removes.
 class ScratchDir {
  public:
   ScratchDir() {

@@ -15,12 +15,13 @@ namespace q3d::testing {
 // longer.
 inline const bool kSeedIsFixed = ::setenv("RC_PARAMS", "seed=20260501", /*overwrite=*/0) == 0;
 
-// A number of the grid with step 1/1024 between `low` and `high`, which are whole numbers.
+// Generates a number on the grid with step 1/1024 between `low` and `high`, which are whole numbers.
 inline rc::Gen<double> number_between(int low, int high) {
   return rc::gen::map(rc::gen::inRange(1024 * low, 1024 * high + 1), [](int n) { return n / 1024.0; });
 }
 
-// UTF-8 text that is hard to write and read: separators, quotes, line ends, letters of two to four bytes.
+// Generates UTF-8 text that is hard to write and read: separators, quotes, line ends, letters of two to four
+// bytes.
 inline rc::Gen<std::string> awkward_text() {
   const std::vector<std::string> pieces{"a",  "B",  "7",  " ",      "\t",     ",",      ";",   "\"",
                                         "'",  "\n", "\r", "\r\n",   "\"\"",   "żubr",   "犬",  "🐎",

@@ -1,4 +1,4 @@
-// Collects what the library said while a test ran.
+// Collects the library's log while a test runs.
 #pragma once
 
 #include <string>

@@ -12,8 +12,8 @@ import time
 
 _INNER_BYTES = 96 << 20
 _OUTER_BYTES = 128 << 20
-# How the inner file system is mounted. ext4's default (auto_da_alloc) mends programs that rename before they sync; a
-# program must not need that. commit=1 makes names reach the disk after a second, before data that nobody synced.
+# How the inner file system is mounted. ext4's default (auto_da_alloc) protects programs that rename before they sync;
+# this program must not need that. commit=1 makes names reach the disk after a second, before data that nobody synced.
 OPTIONS = ("defaults", "noauto_da_alloc,commit=1", "noauto_da_alloc,commit=1,data=writeback")
 
 

@@ -19,13 +19,13 @@ sys.path.insert(0, str(ROOT / "tests/support"))
 from e2e import (Fault, Scene, command, digests, draw_pictures, environment, give_bodies, make_network,  # noqa: E402
                  prima_dataset, run, write_annotations, write_json)
 
-# Files that say when or where, or that only make a later run faster.
+# Files that hold times or places, or that only make a later run faster.
 _NOT_COMPARED = re.compile(r"(^|/)(\.lock|digests\.txt|picture_hashes\.txt|log\.jsonl|stages/builds/.*\.(json|stamps))$")
-# Journals hold one line a unit in the order in which the runs finished them.
+# Journals hold one line for each unit, in the order in which the runs finished them.
 _JOURNAL = re.compile(r"(^|/)journal\.jsonl$")
 _TEMPORARY = re.compile(r"\.tmp$|\.safetensors\..{6}$|^latest\.tmp$")
 
-# In the order of the trials. shared_build is the one of shared_build.py.
+# The jobs are in the order of the trials. shared_build is that of shared_build.py.
 JOBS = ("labels", "network", "calibrate", "train", "leakage", "merge", "export", "sample", "shared_build")
 
 

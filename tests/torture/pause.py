@@ -27,7 +27,7 @@ from e2e import LIMIT_S, Fault, command, environment, wait_until  # jobs has tol
 from shared_build import RANKS, Ranks
 
 JOBS = ("labels", "network", "calibrate", "train", "shared_build")
-# What a rank may have that is in the middle of a write: its file under a temporary name, and its own journal.
+# The files of a rank in the middle of a write: its file under a temporary name, and its own journal.
 _OF_A_RANK = re.compile(r"journal\.jsonl\.[0-9a-f]+\.\d+$|\.tmp$")
 
 
@@ -105,7 +105,7 @@ def group_case(job, folder, seconds, draw):
 def rank_cases(shared, folder, seconds, draw):
     for paused in ([0], [1], list(range(RANKS))):
         for launcher_has_store in (False, True):
-            # In the first half, so that a rank has that many changes even if the other one is quicker.
+            # The pause is in the first half, so that a rank makes so many changes even if the other one is faster.
             number = draw.randrange(shared.changes // 2)
             out = folder / f"ranks_{'_'.join(map(str, paused))}_{launcher_has_store}"
             store = "the launcher" if launcher_has_store else "rank 0"

@@ -25,8 +25,8 @@ sys.path.insert(0, str(ROOT / "tests/support"))
 from e2e import (digests, draw_pictures, give_bodies, latest, prima_dataset, run, write_annotations,  # noqa: E402
                  write_json)
 
-# Damage in these may go unnoticed: a line of the cache that is damaged is not used, and a torn last line of a journal is
-# what a kill leaves.
+# Damage in these files may go unnoticed: a damaged line of the cache is not used, and a torn last line of a journal
+# looks like the result of a kill.
 _MAY_PASS_VERIFY = {"digests.txt", "journal.jsonl"}
 
 

@@ -9,8 +9,8 @@ from e2e import LIMIT_S, Fault, Rank, launcher_store, own_store
 from jobs import Job, counted_calls, result_of
 
 RANKS = 2
-# How long a launcher looks on while the others go on after rank 0 is gone. A rank whose units another one makes is
-# noticed after 15 s.
+# The time that a launcher waits while the other ranks continue after rank 0 is gone. A dead rank is noticed after 15
+# s.
 _LAUNCHER_PATIENCE_S = 40
 # Exit codes of ranks that lost rank 0, or that the launcher ended.
 _MAY_END_WITH = {0, 1, 128 + signal.SIGTERM, -signal.SIGTERM}

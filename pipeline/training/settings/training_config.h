@@ -16,7 +16,7 @@
 namespace q3d::pipeline::training::settings {
 
 struct TrainingNetworkConfig {
-  std::filesystem::path initial;   // checkpoint that training starts from
+  std::filesystem::path initial;   // checkpoint from which training starts
   std::filesystem::path encoders;  // checkpoint whose two image encoders replace those of `initial`; or empty
   std::filesystem::path smal_asset;  // safetensors
   std::filesystem::path priors;      // safetensors with pose_prior_loss.* and shape_prior_loss.*
@@ -29,10 +29,10 @@ struct TrainingNetworkConfig {
 struct PoolConfig {
   std::string name;
   std::vector<std::string> shards;  // paths of files and folders
-  double weight = 1.0;              // of each sample
+  double weight = 1.0;              // weight of each sample
 };
 
-// A stretch of training with its own pools, rounds, optimiser and learning rate.
+// A phase of training with its own pools, rounds, optimiser and learning rate.
 struct PhaseConfig {
   std::string name;
   Objective objective = Objective::prima;
@@ -46,11 +46,11 @@ struct PhaseConfig {
   Decay decay = Decay::linear;
 };
 
-// What the finished weights say about the pictures that they know (pipeline/device/domain.h).
+// The statement of the finished weights about the pictures that they know (pipeline/device/domain.h).
 struct DomainConfig {
   std::string pictures;    // "photographs" or "rendered"; empty says nothing
   std::string trained_on;  // for people
-  std::string held_out;    // name of the pool that L_proj is measured on; empty measures nothing
+  std::string held_out;    // name of the pool on which L_proj is measured; empty measures nothing
   PoolConfig held_out_pool;
   int samples = 500;  // draws from that pool
 };
@@ -63,7 +63,7 @@ struct TrainingConfig {
   DomainConfig domain;
   model::settings::LossWeights loss_weights;
   model::settings::LossVariant loss_variant = model::settings::LossVariant::sound;
-  double backbone_rate = 0.1;  // of the learning rate, in phases with the objective "prima"
+  double backbone_rate = 0.1;  // factor of the learning rate, in phases with the objective "prima"
   double stem_rate = 1.0;      // of the rate of the encoder that an EfficientNet stem belongs to
   int frozen_stem_blocks = 0;  // of an EfficientNet stem: the first convolution and so many blocks; 0 = none
   double weight_decay = 1e-4;
@@ -77,7 +77,8 @@ struct TrainingConfig {
 
 // Reads the files in order; a later file's keys replace an earlier one's. Relative paths are relative to the
 // file that names them. Keeps the phases of `stage` ("1", "3"). `settings` are single keys on top of the
-// files (pipeline/config/config_override.h). Throws ConfigError naming file, key, got and expected.
+// files (pipeline/config/config_override.h). Throws ConfigError that names file and key, what was found and
+// what was expected.
 TrainingConfig load_training_config(const std::vector<std::filesystem::path>& files, const std::string& stage,
                                     const std::vector<std::string>& settings = {});
 
@@ -85,9 +86,10 @@ TrainingConfig load_training_config(const std::vector<std::filesystem::path>& fi
 TrainingConfig parse_training_config(const nlohmann::json& json, const std::string& where,
                                      const std::string& stage);
 
-// The effective values that decide the trained weights, as one JSON document: defaults are filled in, so that
-// a default which changes in a later version does not go unnoticed. Paths are left out, since the digests of
-// their files decide; so are keys that only steer the run (device, threads, how often it saves and logs).
+// Returns the effective values that decide the trained weights, as one JSON document. Defaults are filled in,
+// so that a default that changes in a later version is noticed. Paths are left out, because the digests of
+// their files decide. Keys that only steer the run (device, threads, how often it saves and logs) are left
+// out too.
 nlohmann::json deciding_values(const TrainingConfig& config);
 
 }  // namespace q3d::pipeline::training::settings

@@ -21,7 +21,7 @@ std::vector<std::string> texts(std::span<const std::string_view> words) {
   return {words.begin(), words.end()};
 }
 
-// A member that is an enum, by the functions that name its values.
+// Makes the access to a member that is an enum from the functions that name its values.
 template <typename Struct, typename Enum>
 Word<Struct> enum_word(Enum Struct::*member, std::string_view (*name)(Enum),
                        Enum (*value)(std::string_view)) {

@@ -1,4 +1,4 @@
-// The tables of a training config, one a struct (pipeline/config/setting.h).
+// The tables of a training config, one for each struct (pipeline/config/setting.h).
 #pragma once
 
 #include "pipeline/config/setting.h"
@@ -16,8 +16,8 @@ const config::Settings<loaders::pictures::AugmentOptions>& augmentation_settings
 const config::Settings<DomainConfig>& domain_settings();
 const config::Settings<model::settings::LossWeights>& loss_weight_settings();
 
-// The tables of docs/training.md: training, training network, pools, phases, augmentation, domain and loss
-// weights.
+// Returns the tables of docs/training.md: training, training network, pools, phases, augmentation, domain and
+// loss weights.
 config::SettingsTables training_settings_tables();
 
 }  // namespace q3d::pipeline::training::settings

@@ -10,7 +10,7 @@ namespace q3d::pipeline::training::settings {
 // The names are listed in the order of the enumerators. Every *_from_string throws std::invalid_argument on
 // an unknown name.
 
-// The precision of the forward pass. `automatic` ("auto") takes what suits the device.
+// The precision of the forward pass. `automatic` ("auto") chooses the one that suits the device.
 enum class Precision : std::uint8_t { automatic, float32, bfloat16 };
 std::string_view to_string(Precision precision);
 Precision precision_from_string(std::string_view name);

@@ -8,7 +8,7 @@ import unittest
 
 from .datasets import copy_folder
 
-# Says that prepare() came to its end.
+# This file says that prepare() has finished.
 _READY = "ready"
 
 

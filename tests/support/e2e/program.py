@@ -64,7 +64,7 @@ def environment(fault=None):
     return {**os.environ, "LD_PRELOAD": os.environ["Q3D_FAULTS"], "Q3D_FAULT_PATH": fault.path,
             "Q3D_FAULT_CALL": fault.call, "Q3D_FAULT_ACTION": fault.action, "Q3D_FAULT_ERRNO": fault.error,
             "Q3D_FAULT_SKIP": str(fault.skip), "Q3D_FAULT_TIMES": str(fault.times),
-            # The address sanitizer wants to be the first library. It works as the second one too.
+            # The address sanitizer requires to be the first library, but it also works as the second one.
             "ASAN_OPTIONS": ":".join(filter(None, (os.environ.get("ASAN_OPTIONS"), "verify_asan_link_order=0")))}
 
 
