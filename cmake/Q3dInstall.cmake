@@ -5,7 +5,7 @@
 # PREFIX/lib/quadruped3d/torch           LibTorch: a link to its folder, or a copy (see docs/install.md)
 # PREFIX/lib, include/quadruped3d        the rooms that need no LibTorch, for other projects
 # PREFIX/lib/cmake/quadruped3d           find_package(quadruped3d)
-# PREFIX/share/quadruped3d               configs, the small network, licences, the bill of materials (SPDX)
+# PREFIX/share/quadruped3d               configs, the networks, licences, the bill of materials (SPDX)
 # PREFIX/share/man, bash-completion, zsh/site-functions, fish/vendor_completions.d
 #
 # No file of it holds a path of the machine that built it.

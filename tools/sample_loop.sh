@@ -1,18 +1,22 @@
 #!/usr/bin/env bash
-# Runs the paper's three stages on the rendered world, from scratch:
-#   tools/sample_loop.sh model             pools, pre-trained encoders, Stage 1 (full schedule): models/lite.safetensors
-#   tools/sample_loop.sh loop SCHEDULE SEED   Stage 1, Stage 2, Stage 3, and both networks on the test sets
-# SCHEDULE is full or quick. Every step makes only what is missing, so a stopped run continues where it was.
+# Trainings on the rendered world:
+#   tools/sample_loop.sh model                how models/lite.safetensors was made: pre-trained encoders, Stage 1, and a
+#                                             longer training with the pictures of a second world
+#   tools/sample_loop.sh loop SCHEDULE SEED   the paper's loop: Stage 1, Stage 2, Stage 3, and both networks on the test
+#                                             sets. Both stages train a fresh head on the encoders of
+#                                             models/lite.safetensors
+# SCHEDULE is full or quick. Every step does what is missing, so a run that was stopped goes on where it was.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
 program=build/quadruped3d
 home=data/loop
+shipped=models/lite.safetensors
 
 say() { printf '\n== %s\n' "$*" >&2; }
 
-# There are two ranks on any machine, so that two cores are used and the bits do not depend on the number of cores. Use
-# RANKS=1 to run several trainings side by side.
+# Two ranks on any machine, so that two cores are used and the bits do not depend on how many there are. RANKS=1 is
+# for running several trainings side by side.
 train() {
   if [ "${RANKS:-2}" = 1 ]; then
     "$program" train "$@" --threads 1
@@ -21,26 +25,43 @@ train() {
   fi
 }
 
+# A pool is a dataset in which every annotation is packed into shards.
+pools() {
+  local pool
+  for pool in "$@"; do
+    "$program" build --config "configs/world_pools/$pool.json" --out "$home/pools/$pool"
+  done
+}
+
 prepare() {
   say "the rendered world"
   [ -f data/world/world.json ] || "$program" sample --out data/world
-  say "training pools and the held-out one: every annotation packed into shards"
-  local pool
-  for pool in animal3d ctrlani3d superanimal held_out; do
-    "$program" build --config "configs/world_pools/$pool.json" --out "$home/pools/$pool"
-  done
+  say "training pools and the held-out one"
+  pools animal3d ctrlani3d superanimal held_out
   [ -f "$home/initial.safetensors" ] && [ -f "$home/priors.safetensors" ] ||
     "$program" init --size lite --stem models/efficientnet_lite0.safetensors --out "$home/initial.safetensors" \
       --priors "$home/priors.safetensors" --smal-asset data/world/assets/smal_synthetic.safetensors
-  say "pre-training of the image encoders, shared by all stages"
+}
+
+pretrain() {
+  say "pre-training of the image encoders"
   train --config configs/world_training.json --set frozen_stem_blocks=11 --stage pretrain --out "$home/pretrain"
 }
 
-# Prints the layers of the training config for a schedule and a seed. Stage 3 reads the output of this loop's Stage 2.
+longer() {
+  say "a second world and its training pools"
+  [ -f data/more_world/world.json ] || "$program" sample --seed 101 --share 2 --out data/more_world
+  pools more_animal3d more_ctrlani3d more_superanimal
+  say "a longer training of the whole network"
+  train --config configs/world_training.json --config configs/world_longer.json --stage longer --out "$home/longer"
+}
+
+# The training config's layers for a schedule, a seed and a checkpoint whose encoders all stages start from. Stage 3
+# reads what this loop's Stage 2 made.
 layers() {
-  local schedule=$1 seed=$2 run=$3
+  local schedule=$1 seed=$2 run=$3 encoders=$4
   cat >"$run/run.json" <<JSON
-{ "network": { "encoders": "../pretrain/model.safetensors" },
+{ "network": { "encoders": "$PWD/$encoders" },
   "pools": { "quadruped3d": { "shards": ["stage2/latest"], "weight": 0.5 } },
   "model_dtype": "float16",
   "seed": $seed }
@@ -51,11 +72,11 @@ JSON
 }
 
 stage1() {
-  local schedule=$1 seed=$2 run=$3
+  local schedule=$1 seed=$2 run=$3 encoders=$4
   mkdir -p "$run"
   say "Stage 1 ($schedule schedule, seed $seed)"
   # shellcheck disable=SC2046
-  train $(layers "$schedule" "$seed" "$run") --stage 1 --out "$run/stage1"
+  train $(layers "$schedule" "$seed" "$run" "$encoders") --stage 1 --out "$run/stage1"
 }
 
 evaluate() {
@@ -66,7 +87,7 @@ evaluate() {
 loop() {
   local schedule=$1 seed=$2
   local run=$home/$schedule-$seed
-  stage1 "$schedule" "$seed" "$run"
+  stage1 "$schedule" "$seed" "$run" "$shipped"
   say "Stage 2: pseudo labels for the 2D-only pictures"
   printf '{ "network": { "checkpoint": "stage1/model.safetensors", "compute_threads": 1 } }\n' >"$run/stage2.json"
   local stage2=(--config configs/world_stage2.json --config "$run/stage2.json")
@@ -79,7 +100,7 @@ loop() {
     --truth data/world/truth/superanimal_quadruped_train.json --masks data/world --report "$run/labels"
   say "Stage 3: a fresh head on the same encoders, with the pseudo labels in place of the 2D annotations"
   # shellcheck disable=SC2046
-  train $(layers "$schedule" "$seed" "$run") --stage 3 --out "$run/stage3"
+  train $(layers "$schedule" "$seed" "$run" "$shipped") --stage 3 --out "$run/stage3"
   say "both networks on the test sets"
   evaluate "$run/stage1" "$run/evaluation1"
   evaluate "$run/stage3" "$run/evaluation3"
@@ -90,8 +111,10 @@ loop() {
 case "${1:-}" in
   model)
     prepare
-    stage1 full 0 "$home/full-0"
-    say "trained: $home/full-0/stage1/model.safetensors (models/lite.safetensors ships such a network)"
+    pretrain
+    stage1 full 0 "$home/model" "$home/pretrain/model.safetensors"
+    longer
+    say "trained: $home/longer/model.safetensors ($shipped is such a network)"
     ;;
   loop)
     prepare

@@ -106,7 +106,7 @@ class Tutorial(Case):
         steps = json.loads(self.files["train.json"])["stages"]["3"][0]["steps"]
         self.assertEqual(log[-1]["step"], steps)
         self.assertTrue(np.isfinite([line["loss"] for line in log]).all())
-        before, after = (read_safetensors(path) for path in (ROOT / "models/small.safetensors",
+        before, after = (read_safetensors(path) for path in (ROOT / "models/lite.safetensors",
                                                              self.home / "stage3/model.safetensors"))
         moved = [name for name in after if name in before and not np.array_equal(before[name], after[name])]
         self.assertGreater(len(moved), 100)

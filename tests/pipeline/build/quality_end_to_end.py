@@ -7,7 +7,7 @@ import pathlib
 from e2e import (Case, Scene, SceneCase, draw_pictures, latest, prima_dataset, render_world, run, run_json,
                  world_animal3d, world_body, write_annotations, write_json)
 
-SHIPPED = pathlib.Path(__file__).parents[3] / "models" / "small.safetensors"
+SHIPPED = pathlib.Path(__file__).parents[3] / "models" / "lite.safetensors"
 
 
 class Quality(Case):
