@@ -75,17 +75,18 @@ TEST_F(Derived, MergeHasAllCandidatesOnceAndTellsDuplicates) {
 }
 
 TEST_F(Derived, ADamagedVersionIsWrittenAgain) {
-  const DerivedVersion first = merge({dogs_.folder, wolves_.folder}, out(), "", "1.0.0");
-  EXPECT_TRUE(merge({dogs_.folder, wolves_.folder}, out(), "", "1.0.0").was_up_to_date);
+  const auto merged = [&] { return merge({dogs_.folder, wolves_.folder}, out(), "", "1.0.0").version; };
+  const DerivedVersion first = merged();
+  EXPECT_TRUE(merged().was_up_to_date);
   const dataset::PublishedDataset made(first.folder);
   const std::string document = manifests::read_file(first.folder / "dataset.json");
   for (const fs::path& damaged : {made.shard_file(made.manifest().shards.front()), made.verdicts_file()}) {
     fs::remove(damaged);
-    EXPECT_FALSE(merge({dogs_.folder, wolves_.folder}, out(), "", "1.0.0").was_up_to_date);
+    EXPECT_FALSE(merged().was_up_to_date);
     expect_sound(first.folder, first.counts.retained + first.counts.refined);
   }
   manifests::write_file_atomically(first.folder / "dataset.json", document + " ");
-  EXPECT_FALSE(merge({dogs_.folder, wolves_.folder}, out(), "", "1.0.0").was_up_to_date);
+  EXPECT_FALSE(merged().was_up_to_date);
   EXPECT_EQ(manifests::read_file(first.folder / "dataset.json"), document);
 }
 
