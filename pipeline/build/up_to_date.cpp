@@ -259,6 +259,9 @@ std::optional<PathTable> UpToDateRecord::inputs(const candidates::Ingest& ingest
 }
 
 void UpToDateRecord::keep(const candidates::Ingest& ingest, const fs::path& folder) const {
+  const fs::path file = record_file(out_, request_);
+  // What a build that was killed while it wrote its record left.
+  if (fs::exists(file.parent_path())) manifests::remove_temporaries(file.parent_path());
   if (config_.leakage) return;
   const auto paths = inputs(ingest);
   if (!paths) return;
@@ -270,7 +273,7 @@ void UpToDateRecord::keep(const candidates::Ingest& ingest, const fs::path& fold
                   {"candidates", ingest.candidates.size()},
                   {"units", ingest.units.size()},
                   {"notes", notes}};
-  RecordWriter record(record_file(out_, request_));
+  RecordWriter record(file);
   record.write(request_ + '\n');
   record.write(said.dump() + '\n');
   std::int64_t newest = 0;
