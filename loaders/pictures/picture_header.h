@@ -17,7 +17,7 @@ struct PictureHeader {
 // Reads the size and the EXIF orientation of a JPEG (APP1) or a PNG (eXIf). Returns nothing if the content is
 // neither, or if its header is damaged or cut short. The file is read in small pieces up to its pixels.
 // Throws manifests::IoError if the file exists and cannot be read; a file that does not exist has no header.
-std::optional<PictureHeader> read_picture_header(const std::filesystem::path& file);
-std::optional<PictureHeader> read_picture_header(std::span<const std::byte> bytes);
+std::optional<PictureHeader> read_picture_header(const std::filesystem::path& path);
+std::optional<PictureHeader> read_picture_header(std::span<const std::byte> content);
 
 }  // namespace q3d::loaders::pictures

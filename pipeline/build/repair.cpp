@@ -122,7 +122,7 @@ void build_again(const fs::path& folder, const config::BuildConfig& config, run:
   }
   if (!document || manifests::read_file(folder / "dataset.json") == *document) return;
   manifests::write_file_atomically(folder / "dataset.json", *document);
-  summary.unrepaired.push_back(
+  summary.unrepaired.emplace_back(
       "dataset.json: the build gives other labels or verdicts than before, so the earlier file was put back");
 }
 

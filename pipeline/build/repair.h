@@ -27,7 +27,7 @@ struct RepairSummary {
 //
 // Throws run::ConfigError if dataset.json says that it was built with another config, and like verify, build
 // and manifests::FolderLock.
-RepairSummary repair(const std::filesystem::path& dataset, const std::optional<config::BuildConfig>& config,
+RepairSummary repair(const std::filesystem::path& given, const std::optional<config::BuildConfig>& config,
                      const run::RunOptions& options);
 
 }  // namespace q3d::pipeline::build
