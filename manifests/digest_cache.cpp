@@ -135,12 +135,7 @@ std::string DigestCache::digest(const std::filesystem::path& path) {
 }
 
 std::optional<std::string> DigestCache::digest_if_present(const std::filesystem::path& path) {
-  try {
-    return digest(path);
-  } catch (const IoError& error) {
-    if (error.names_no_file()) return std::nullopt;
-    throw;
-  }
+  return if_present([&] { return digest(path); });
 }
 
 void DigestCache::save() const {

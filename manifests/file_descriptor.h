@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -87,6 +88,17 @@ auto read_input(const std::filesystem::path& path, Read&& read) {
     } catch (const IoError& error) {
       if (error.code() != ESTALE || !pause_before_retry(ESTALE, attempt)) throw;
     }
+  }
+}
+
+// Returns read(), or nothing if it throws an IoError that says that there is no such file.
+template <typename Read>
+auto if_present(Read&& read) -> std::optional<decltype(read())> {
+  try {
+    return read();
+  } catch (const IoError& error) {
+    if (error.names_no_file()) return std::nullopt;
+    throw;
   }
 }
 

@@ -32,6 +32,7 @@ torch::Tensor without_border(const torch::Tensor& maps, std::int64_t before, std
 }
 
 void clear_border(const torch::Tensor& maps, const Frame& frame) {
+  if (frame.before == 0 && frame.after == 0) return;
   for (const std::int64_t axis : {2, 3}) {
     maps.narrow(axis, 0, frame.before).zero_();
     maps.narrow(axis, maps.size(axis) - frame.after, frame.after).zero_();

@@ -123,10 +123,11 @@ void set_found_picture(Loading& loading, RecordReader& reader, const PictureName
   sample.split = loading.options.split;
   const std::string valid_name = manifests::valid_utf8(name.name);
   sample.image_ref = bounded_text(valid_name);
+  // Bytes are written out with backslashes, which id_part() would take for ends of folders.
   const std::string picture = bounded_text(manifests::valid_utf8(id_part(bounded_text(name.name))));
   sample.id = fmt::format("{}/{}/{}#{}", sample.dataset, sample.split, picture, bounded_text(annotation));
   if (reader.failed()) return;
-  if (valid_name != name.name) {
+  if (!manifests::is_utf8(name.name)) {
     reader.fail(Reason::record_malformed, name.field,
                 fmt::format("\"{}\", a name with bytes that are no UTF-8", sample.image_ref),
                 "a name in the encoding UTF-8; rename the picture or its folder");

@@ -43,13 +43,6 @@ std::optional<std::string> case_folded(std::string_view text) {
 
 }  // namespace
 
-bool is_utf8(std::string_view text) {
-  UErrorCode error = U_ZERO_ERROR;
-  int32_t size = 0;
-  u_strFromUTF8(nullptr, 0, &size, text.data(), static_cast<int32_t>(text.size()), &error);
-  return error != U_INVALID_CHAR_FOUND && error != U_ILLEGAL_ARGUMENT_ERROR;
-}
-
 std::string folded_name(std::string_view name) {
   std::string text(name);
   if (!is_ascii(name)) text = case_folded(name).value_or(text);

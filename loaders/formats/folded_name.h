@@ -11,7 +11,4 @@ namespace q3d::loaders::formats {
 // name that is not valid UTF-8 keeps its accents.
 std::string folded_name(std::string_view name);
 
-// Returns whether the text is valid UTF-8.
-bool is_utf8(std::string_view text);
-
 }  // namespace q3d::loaders::formats

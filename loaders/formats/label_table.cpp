@@ -10,8 +10,8 @@
 #include <string_view>
 #include <utility>
 
-#include "loaders/formats/folded_name.h"
 #include "manifests/file_descriptor.h"
+#include "manifests/valid_utf8.h"
 
 namespace q3d::loaders::formats {
 
@@ -36,9 +36,10 @@ namespace {
 void require_utf8(const LabelTable& table, const std::filesystem::path& file) {
   const bool are_columns =
       std::all_of(table.columns.begin(), table.columns.end(), [](const LabelColumn& column) {
-        return is_utf8(column.scorer) && is_utf8(column.individual) && is_utf8(column.bodypart);
+        return manifests::is_utf8(column.scorer) && manifests::is_utf8(column.individual) &&
+               manifests::is_utf8(column.bodypart);
       });
-  if (are_columns && std::all_of(table.rows.begin(), table.rows.end(), is_utf8)) return;
+  if (are_columns && std::all_of(table.rows.begin(), table.rows.end(), manifests::is_utf8)) return;
   throw std::runtime_error(fmt::format(
       "{}: got a name of a {} with bytes that are no UTF-8, expected the encoding UTF-8: save the file "
       "with it (\"CSV UTF-8\" in Excel)",

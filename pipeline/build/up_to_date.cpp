@@ -260,7 +260,7 @@ std::optional<PathTable> UpToDateRecord::inputs(const candidates::Ingest& ingest
 
 void UpToDateRecord::keep(const candidates::Ingest& ingest, const fs::path& folder) const {
   const fs::path file = record_file(out_, request_);
-  // What a build that was killed while it wrote its record left.
+  // A build that was killed while it wrote its record has left a temporary file.
   if (fs::exists(file.parent_path())) manifests::remove_temporaries(file.parent_path());
   if (config_.leakage) return;
   const auto paths = inputs(ingest);

@@ -11,7 +11,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What stands around a path in a sentence. A path within a longer one, or within a URL, is left alone.
+// A path in a sentence begins behind one of these characters and ends before one of those below, so that a
+// path within a longer one or within a URL is left alone.
 constexpr std::string_view kBefore = " \t\n\"'(<[=:,;";
 constexpr std::string_view kAfter = " \t\n\"')>]:,;";
 

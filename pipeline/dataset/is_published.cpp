@@ -25,15 +25,6 @@ struct ListedFile {
   std::optional<std::string> got{};  // of the bytes; nothing if there is no such file
 };
 
-std::optional<std::string> digest_if_present(const fs::path& file) {
-  try {
-    return manifests::sha256_file(file);
-  } catch (const manifests::IoError& error) {
-    if (error.names_no_file()) return std::nullopt;
-    throw;
-  }
-}
-
 // Reads dataset.json. Returns nothing, and warns, if the file is not as it was written.
 std::optional<DatasetManifest> read_undamaged(const fs::path& folder) {
   try {
@@ -60,7 +51,8 @@ bool is_published(const fs::path& folder, const std::string& key) {
   for (const ShardEntry& shard : manifest->shards) files.push_back({folder / shard.file, shard.sha256});
   files.push_back({folder / "verdicts.csv", manifest->verdicts_sha256});
   tbb::parallel_for(std::size_t{0}, files.size(), [&](std::size_t i) {
-    if (!run::interrupted()) files[i].got = digest_if_present(files[i].path);
+    if (run::interrupted()) return;
+    files[i].got = manifests::if_present([&] { return manifests::sha256_file(files[i].path); });
   });
   run::throw_if_interrupted();
   bool is_sound = true;

@@ -28,16 +28,6 @@ std::vector<fs::path> stage_folders(const fs::path& out) {
   return folders;
 }
 
-// Returns nothing if there is no such file.
-std::optional<std::string> digest_if_present(const fs::path& file) {
-  try {
-    return manifests::sha256_file(file);
-  } catch (const manifests::IoError& error) {
-    if (error.names_no_file()) return std::nullopt;
-    throw;
-  }
-}
-
 void check_manifest(const fs::path& folder, StageCheck& check) {
   const fs::path file = folder / "manifest.json";
   const std::string name = folder.filename().string();
@@ -61,7 +51,7 @@ void check_units(const fs::path& folder, StageCheck& check) {
     run::throw_if_interrupted();
     ++check.files;
     const fs::path path = folder / entry.file;
-    const auto got = digest_if_present(path);
+    const auto got = manifests::if_present([&] { return manifests::sha256_file(path); });
     if (got == entry.sha256) continue;
     check.problems.push_back({path,
                               got ? fmt::format("SHA-256 is {}, its journal says {}", *got, entry.sha256)

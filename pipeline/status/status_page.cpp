@@ -191,8 +191,6 @@ std::string page(const FolderStatus& status) {
 ordered_json to_json(const BuildStatus& build) {
   ordered_json stages = ordered_json::array();
   for (const StageStatus& stage : build.stages) stages.push_back(to_json(stage));
-  ordered_json command = ordered_json::array();
-  for (const std::string& word : build.command) command.push_back(manifests::valid_utf8(word));
   return {{"version", build.version},
           {"key", build.key},
           {"latest", build.is_latest},
@@ -204,7 +202,7 @@ ordered_json to_json(const BuildStatus& build) {
           {"stages", stages},
           {"dataset", to_json(build.dataset)},
           {"report", to_json(build.report)},
-          {"command", command}};
+          {"command", build.command}};
 }
 
 ordered_json to_json(const FolderStatus& status) {

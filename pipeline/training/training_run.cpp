@@ -249,11 +249,6 @@ TrainingPools held_out_pools(const TrainingConfig& config, const TrainingPools& 
   return pools;
 }
 
-std::vector<std::string> joined(std::vector<std::string> first, const std::vector<std::string>& second) {
-  first.insert(first.end(), second.begin(), second.end());
-  return first;
-}
-
 class Run {
  public:
   Run(const TrainingConfig& config, const TrainingOptions& options)
@@ -267,7 +262,6 @@ class Run {
         priors_(model::load_priors(smal::tensors::SafeTensors::open(config.network.priors), device_.device)),
         pools_(pools_of(config.phases), options.skip_damaged),
         held_out_(held_out_pools(config, pools_, options.skip_damaged)),
-        left_out_(joined(pools_.left_out(), held_out_.left_out())),
         key_(run_key(config, pools_.identity())),
         stored_(load_state(state_path(), key_)) {
     if (stored_) position_ = stored_->position;
@@ -296,7 +290,7 @@ class Run {
   TrainingSummary run() {
     TrainingSummary summary;
     summary.rank = ranks_->rank();
-    summary.left_out = left_out_;
+    summary.left_out = left_out();
     for (const PhaseConfig& phase : config_.phases) summary.steps_total += phase.steps;
     std::optional<TrainingLog> log;
     if (leads()) log.emplace(options_.out / "log.jsonl", position_.phase, position_.step);
@@ -316,9 +310,16 @@ class Run {
   }
 
  private:
+  // Returns what is left out of all pools, the held-out one too.
+  std::vector<std::string> left_out() const {
+    std::vector<std::string> lines = pools_.left_out();
+    lines.insert(lines.end(), held_out_.left_out().begin(), held_out_.left_out().end());
+    return lines;
+  }
+
   void tell_left_out() const {
     constexpr std::size_t kShown = 20;
-    const std::vector<std::string>& lines = left_out_;
+    const std::vector<std::string> lines = left_out();
     for (std::size_t i = 0; i < std::min(kShown, lines.size()); ++i)
       run::log_warning("left out: " + lines[i]);
     if (lines.size() > kShown) {
@@ -480,8 +481,7 @@ class Run {
   smal::tensors::SmalAsset asset_;
   model::Priors priors_;
   TrainingPools pools_;
-  TrainingPools held_out_;             // has no pool if the config names none
-  std::vector<std::string> left_out_;  // of all pools
+  TrainingPools held_out_;  // has no pool if the config names none
   std::string key_;
   std::optional<StoredState> stored_;
   TrainingPosition position_;

@@ -66,48 +66,49 @@ TEST(AtomicFile, CommitGivesTheNameOrRemovesTheTemporary) {
   EXPECT_FALSE(fs::exists(temporary));
 }
 
-TEST(AtomicWriter, GivesTheNameToTheWholeTextAlone) {
-  const testing::ScratchDir scratch;
-  const fs::path path = scratch.path() / "a.csv";
-  write_file_atomically(path, "old");
+class AtomicWriterTest : public ::testing::Test {
+ protected:
+  AtomicWriterTest() { write_file_atomically(path_, "old"); }
+
+  void expect_alone(const std::string& content) const {
+    EXPECT_EQ(read_file(path_), content);
+    EXPECT_EQ(count_files(scratch_.path()), 1U);
+  }
+
+  const testing::ScratchDir scratch_;
+  const fs::path path_ = scratch_.path() / "a.csv";
+};
+
+TEST_F(AtomicWriterTest, GivesTheNameToTheWholeTextAlone) {
   std::string text;
-  AtomicWriter writer(path);
+  AtomicWriter writer(path_);
   for (int i = 0; i < 100'000; ++i) {  // more than one block
     const std::string line = std::to_string(i) + "\n";
     writer.write(line);
     text += line;
   }
-  EXPECT_EQ(read_file(path), "old");
+  EXPECT_EQ(read_file(path_), "old");
   EXPECT_EQ(writer.commit(), sha256(text));
-  EXPECT_EQ(read_file(path), text);
-  EXPECT_EQ(count_files(scratch.path()), 1U);
+  expect_alone(text);
 }
 
-TEST(AtomicWriter, LeavesNothingBehindIfItIsNotCommitted) {
-  const testing::ScratchDir scratch;
-  const fs::path path = scratch.path() / "a.csv";
-  write_file_atomically(path, "old");
+TEST_F(AtomicWriterTest, LeavesNothingBehindIfItIsNotCommitted) {
   {
-    AtomicWriter writer(path);
+    AtomicWriter writer(path_);
     writer.write("new");
-    EXPECT_EQ(count_files(scratch.path()), 2U);
+    EXPECT_EQ(count_files(scratch_.path()), 2U);
   }
-  EXPECT_EQ(read_file(path), "old");
-  EXPECT_EQ(count_files(scratch.path()), 1U);
+  expect_alone("old");
 }
 
-TEST(AtomicWriter, FullDiskKeepsTheOldFileAndLeavesNoTemporary) {
-  const testing::ScratchDir scratch;
-  const fs::path path = scratch.path() / "a.csv";
-  write_file_atomically(path, "old");
+TEST_F(AtomicWriterTest, FullDiskKeepsTheOldFileAndLeavesNoTemporary) {
   {
-    AtomicWriter writer(path);
+    AtomicWriter writer(path_);
     writer.write(std::string(10'000, 'x'));
     const testing::FullDisk full(4096);
     EXPECT_THROW(writer.commit(), IoError);
   }
-  EXPECT_EQ(read_file(path), "old");
-  EXPECT_EQ(count_files(scratch.path()), 1U);
+  expect_alone("old");
 }
 
 TEST(AtomicFile, RemovesOnlyTemporaries) {

@@ -59,8 +59,8 @@ class StaleFile : public ::testing::Test {
  protected:
   StaleFile() { std::ofstream(path_) << "0123456789"; }
 
-  // What follows the first four bytes if the server forgets the file after them, and `meanwhile` happens.
-  // `name` is the kernel's of the open file by then.
+  // Returns what follows the first four bytes if the server forgets the file after them, and `meanwhile`
+  // happens. `name` is the kernel's of the open file by then.
   std::string rest(const std::function<void()>& meanwhile, const char* name = "/file") const {
     BlockReader reader(path_);
     std::string text(4, ' ');

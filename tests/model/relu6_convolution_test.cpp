@@ -24,23 +24,32 @@ struct Result {
   torch::Tensor value, maps, weight, bias;
 };
 
+struct Inputs {
+  torch::Tensor maps, weight, bias;
+};
+
 class Relu6Convolution : public ::testing::TestWithParam<Case> {
  protected:
-  // relu6_convolution, or LibTorch's operators, and the gradients of sum(value * direction).
-  Result differentiate(torch::ScalarType dtype, bool own) const {
+  static torch::Tensor made(const std::vector<std::int64_t>& sizes, double scale, torch::ScalarType dtype) {
+    return (torch::randn(sizes, torch::kFloat64) * scale).to(torch::kBFloat16).to(dtype);
+  }
+
+  // The same numbers in every dtype.
+  static Inputs inputs(torch::ScalarType dtype) {
     const auto& [name, shape, in, out, depthwise, frame] = GetParam();
     at::manual_seed(7);
-    const auto made = [&](const std::vector<std::int64_t>& sizes, double scale) {
-      return (torch::randn(sizes, torch::kFloat64) * scale).to(torch::kBFloat16).to(dtype);
-    };
-    const torch::Tensor maps =
-        made({3, in, 12, 10}, 1.0).contiguous(at::MemoryFormat::ChannelsLast).requires_grad_();
-    const torch::Tensor weight =
-        made({out, depthwise ? 1 : in, shape.side, shape.side}, 1.0).requires_grad_();
-    const torch::Tensor bias = made({out}, 2.0).requires_grad_();
+    return {made({3, in, 12, 10}, 1.0, dtype).contiguous(at::MemoryFormat::ChannelsLast),
+            made({out, depthwise ? 1 : in, shape.side, shape.side}, 1.0, dtype), made({out}, 2.0, dtype)};
+  }
+
+  // relu6_convolution, or LibTorch's operators, and the gradients of sum(value * direction).
+  static Result differentiate(torch::ScalarType dtype, bool own) {
+    const auto [maps, weight, bias] = inputs(dtype);
+    for (const torch::Tensor& leaf : {maps, weight, bias}) leaf.requires_grad_();
     const torch::Tensor value =
-        own ? relu6_convolution(maps, weight, bias, shape, frame) : of_libtorch(maps, weight, bias);
-    (value * made(value.sizes().vec(), 1.0)).sum().backward();
+        own ? relu6_convolution(maps, weight, bias, GetParam().shape, GetParam().frame)
+            : of_libtorch(maps, weight, bias);
+    (value * made(value.sizes().vec(), 1.0, dtype)).sum().backward();
     return {value.detach(), maps.grad(), weight.grad(), bias.grad()};
   }
 
@@ -87,16 +96,10 @@ TEST_P(Relu6Convolution, HasTheBitsOfTwoOperators) {
 
 TEST_P(Relu6Convolution, IsTheSameWithoutGradients) {
   const Result with = differentiate(torch::kFloat32, true);
-  at::manual_seed(7);
   const at::NoGradGuard no_grad;
-  const auto& [name, shape, in, out, depthwise, frame] = GetParam();
-  const auto made = [](const std::vector<std::int64_t>& sizes, double scale) {
-    return (torch::randn(sizes, torch::kFloat64) * scale).to(torch::kBFloat16).to(torch::kFloat32);
-  };
-  const torch::Tensor maps = made({3, in, 12, 10}, 1.0).contiguous(at::MemoryFormat::ChannelsLast);
-  const torch::Tensor weight = made({out, depthwise ? 1 : in, shape.side, shape.side}, 1.0);
-  const torch::Tensor bias = made({out}, 2.0);
-  EXPECT_TRUE(torch::equal(relu6_convolution(maps, weight, bias, shape, frame), with.value));
+  const auto [maps, weight, bias] = inputs(torch::kFloat32);
+  EXPECT_TRUE(
+      torch::equal(relu6_convolution(maps, weight, bias, GetParam().shape, GetParam().frame), with.value));
 }
 
 INSTANTIATE_TEST_SUITE_P(Shapes, Relu6Convolution,

@@ -55,7 +55,7 @@ TEST_F(Repair, ASoundDatasetIsLeftAsItIs) {
   EXPECT_FALSE(fs::exists(out_ / "quarantine"));
 }
 
-// What the disk does not give now may be sound.
+// A file that the disk refuses to give may be sound.
 TEST_F(Repair, AFileThatCannotBeReadIsNotMovedAway) {
   for (const char* file : {"/shards/000001.h5", "/verdicts.csv"}) {
     const testing::FailingIo io(testing::Call::open, file, EACCES);

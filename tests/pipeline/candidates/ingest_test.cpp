@@ -125,7 +125,7 @@ TEST_F(Corrected, PointsBesideThePictureAreRefused) {
   EXPECT_EQ(corrected(200.0, 4.0).failure, Reason::keypoints_outside);
 }
 
-// What the file's labels are is no matter for a record that nobody corrected.
+// A record that nobody corrected keeps the reason of its labels, whatever its picture is.
 TEST_F(Corrected, WithoutCorrectionsTheReasonStays) {
   write_picture(root() / kPicture);
   json record = unlabelled();
