@@ -1,7 +1,6 @@
 #include "manifests/block_reader.h"
 
 #include <algorithm>
-#include <cerrno>
 #include <utility>
 
 namespace q3d::manifests {
@@ -11,25 +10,11 @@ constexpr std::size_t kBlock = std::size_t{1} << 18U;
 
 }  // namespace
 
-BlockReader::BlockReader(std::filesystem::path path)
-    : path_(std::move(path)), file_(open_input(path_)), stamp_(stamp_of(file_)) {}
-
 std::size_t BlockReader::read(std::span<char> bytes) {
   const auto count = static_cast<std::size_t>(std::min<std::uint64_t>(bytes.size(), size() - at_));
-  for (int attempt = 0;; ++attempt) {
-    try {
-      file_.read_at(at_, std::as_writable_bytes(bytes.first(count)));
-      at_ += count;
-      return count;
-    } catch (const IoError& error) {
-      if (error.code() != ESTALE || !pause_before_retry(ESTALE, attempt)) throw;
-    }
-    FileDescriptor again = open_input(path_);
-    if (stamp_of(again) != stamp_) {
-      throw IoError("read", path_, "it has changed while it was read: run again", ESTALE);
-    }
-    file_ = std::move(again);
-  }
+  file_.read_at(at_, std::as_writable_bytes(bytes.first(count)));
+  at_ += count;
+  return count;
 }
 
 std::optional<std::string_view> LineReader::next() {

@@ -8,27 +8,24 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 
-#include "manifests/file_descriptor.h"
-#include "manifests/file_stamp.h"
+#include "manifests/reopened_file.h"
 
 namespace q3d::manifests {
 
 class BlockReader {
  public:
   // Opens a regular file. Throws IoError.
-  explicit BlockReader(std::filesystem::path path);
+  explicit BlockReader(std::filesystem::path path) : file_(std::move(path)) {}
 
-  std::uint64_t size() const { return stamp_.size; }  // bytes of the whole file
+  std::uint64_t size() const { return file_.size(); }  // bytes of the whole file
   // Reads the next bytes of the file into `bytes` and returns how many they were. There are fewer than asked
-  // for only at the end of the file. If the server of a network disk has forgotten the open file (ESTALE),
-  // the file is opened again. Throws IoError, also if the file was written or replaced in the meantime.
+  // for only at the end of the file. Throws as ReopenedFile::read_at does.
   std::size_t read(std::span<char> bytes);
 
  private:
-  std::filesystem::path path_;
-  FileDescriptor file_;
-  FileStamp stamp_;
+  ReopenedFile file_;
   std::uint64_t at_ = 0;
 };
 

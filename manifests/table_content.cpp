@@ -7,7 +7,8 @@
 
 namespace q3d::manifests {
 
-TableContent::TableContent(const std::filesystem::path& path) : path_(path), file_(open_input(path)) {}
+TableContent::TableContent(const std::filesystem::path& path)
+    : path_(path), file_(std::make_unique<ReopenedFile>(path)) {}
 
 TableContent::TableContent(std::filesystem::path path, std::vector<std::byte> bytes)
     : path_(std::move(path)), bytes_(std::move(bytes)) {}
