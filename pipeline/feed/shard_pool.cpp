@@ -121,14 +121,23 @@ TrainingSample ShardPool::sample(std::int64_t index) const {
   return sample;
 }
 
-std::set<std::string> ShardPool::species() const {
-  std::set<std::string> names;
+// Returns the texts of a column, except the empty one.
+std::set<std::string> ShardPool::texts(const char* column) const {
+  std::set<std::string> texts;
   for (const manifests::ShardReader& shard : shards_) {
-    for (std::string& name : shard.table().text("species", 0, shard.rows())) {
-      if (!name.empty()) names.insert(std::move(name));
+    for (std::string& text : shard.table().text(column, 0, shard.rows())) {
+      if (!text.empty()) texts.insert(std::move(text));
     }
   }
-  return names;
+  return texts;
+}
+
+std::set<std::string> ShardPool::species() const {
+  return texts("species");
+}
+
+std::set<std::string> ShardPool::pictures() const {
+  return texts("image_sha256");
 }
 
 std::string ShardPool::id(std::int64_t index) const {

@@ -53,7 +53,8 @@ class ShardPool {
   // be read.
   TrainingSample sample(std::int64_t index) const;
   std::string id(std::int64_t index) const;
-  std::set<std::string> species() const;  // all names but the empty one
+  std::set<std::string> species() const;   // all names but the empty one
+  std::set<std::string> pictures() const;  // SHA-256 of the pictures that its shards were made from
 
  private:
   struct Place {
@@ -61,6 +62,7 @@ class ShardPool {
     std::int64_t row;
   };
   Place locate(std::int64_t index) const;
+  std::set<std::string> texts(const char* column) const;
 
   struct ShardAndRow {
     std::uint32_t shard = 0;

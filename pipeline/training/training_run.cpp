@@ -8,7 +8,9 @@
 #include <map>
 #include <numeric>
 #include <optional>
+#include <set>
 #include <stdexcept>
+#include <string>
 #include <thread>
 #include <utility>
 
@@ -232,19 +234,20 @@ std::vector<PoolConfig> pools_of(const std::vector<PhaseConfig>& phases) {
   return pools;
 }
 
-// Returns the held-out pool. Throws ConfigError if training draws from one of its shards.
+// Returns the held-out pool. Throws ConfigError if training draws from one of its pictures.
 TrainingPools held_out_pools(const TrainingConfig& config, const TrainingPools& trained, bool skip_damaged) {
   if (config.domain.held_out.empty()) return {{}, skip_damaged};
   TrainingPools pools({config.domain.held_out_pool}, skip_damaged);
-  for (const auto& [pool, shards] : trained.identity().items()) {
-    for (const auto& digest : pools.identity().at(config.domain.held_out)) {
-      if (digest.is_string() && std::find(shards.begin(), shards.end(), digest) != shards.end()) {
-        throw run::ConfigError(fmt::format(
-            "domain: held_out: the pool {} shares a shard with the pool {}, which this stage trains on; "
-            "expected pictures that training does not see",
-            config.domain.held_out, pool));
-      }
-    }
+  const std::set<std::string> unseen = pools.open(config.domain.held_out).pictures();
+  for (const auto& [name, shards] : trained.identity().items()) {
+    const std::set<std::string> seen = trained.open(name).pictures();
+    const auto shared = std::count_if(seen.begin(), seen.end(),
+                                      [&](const std::string& picture) { return unseen.contains(picture); });
+    if (shared == 0) continue;
+    throw run::ConfigError(fmt::format(
+        "domain: held_out: {} of the {} pictures of the pool {} are in the pool {} too, which this stage "
+        "trains on; expected pictures that training does not see",
+        shared, unseen.size(), config.domain.held_out, name));
   }
   return pools;
 }

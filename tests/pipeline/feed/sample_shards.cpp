@@ -5,6 +5,7 @@
 
 #include "loaders/pictures/encode.h"
 #include "loaders/pictures/stored_crop.h"
+#include "manifests/digest.h"
 
 namespace q3d::testing {
 
@@ -35,6 +36,7 @@ manifests::ShardSample shard_sample(const std::string& id, unsigned seed, bool l
   sample.image_width_px = picture.cols;
   sample.image_height_px = picture.rows;
   sample.crop = loaders::pictures::encode_png(stored.rgb);
+  sample.image_sha256 = manifests::sha256(sample.crop);  // stands for that of the picture
   sample.crop_side_px = stored.rgb.rows;
   sample.crop_from_image = stored.from_image;
   sample.patch_box = {box.center_x_px, box.center_y_px, box.side_px};
