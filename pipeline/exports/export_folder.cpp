@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include "manifests/atomic_file.h"
@@ -40,6 +42,16 @@ std::string line_of(const ExportFolder::Files& pictures) {
   ordered_json line = ordered_json::object();
   for (const auto& [name, file] : pictures) line[name] = {file.bytes, file.sha256};
   return line.dump() + "\n";
+}
+
+// Reads that line back, which is the first one of a part.
+ExportFolder::Files pictures_of(const std::string& part) {
+  ExportFolder::Files pictures;
+  const auto line = manifests::parse_json<ordered_json>(part.substr(0, part.find('\n')));
+  for (const auto& [name, file] : line.items()) {
+    pictures[name] = {file.at(1).get<std::string>(), file.at(0).get<std::size_t>()};
+  }
+  return pictures;
 }
 
 ordered_json list_of(const ExportFolder::Files& files) {
@@ -139,11 +151,21 @@ void ExportFolder::open_parts() {
   journal_ = std::make_unique<manifests::Journal>(parts_ / "journal.jsonl");
 }
 
+// Returns whether a part and all of its pictures have the bytes that an earlier run wrote.
+bool ExportFolder::is_whole(const fs::path& part, const std::string& sha256) const {
+  const auto content = manifests::if_present([&] { return manifests::read_file(part); });
+  if (!content || manifests::sha256(*content) != sha256) return false;
+  const Files pictures = pictures_of(*content);
+  return std::all_of(pictures.begin(), pictures.end(), [&](const auto& picture) {
+    return manifests::if_present([&] { return manifests::sha256_file(out_ / picture.first); }) ==
+           picture.second.sha256;
+  });
+}
+
 bool ExportFolder::has_part(std::int64_t unit, const std::string& input_digest) {
   const auto entry = journal_->find(unit, input_digest);
   if (!entry) return false;
-  const fs::path file = parts_ / entry->file;
-  if (fs::exists(file) && manifests::sha256_file(file) == entry->sha256) return true;
+  if (is_whole(parts_ / entry->file, entry->sha256)) return true;
   journal_->forget(unit);
   return false;
 }
@@ -171,12 +193,8 @@ std::string ExportFolder::take_part(std::int64_t unit) {
     throw std::runtime_error(fmt::format("{}: changed while the export ran; run the same command again",
                                          (parts_ / part_name(unit)).string()));
   }
-  const std::size_t end = content.find('\n');
-  const ordered_json pictures = manifests::parse_json<ordered_json>(content.substr(0, end));
-  for (const auto& [name, file] : pictures.items()) {
-    pictures_[name] = {file.at(1).get<std::string>(), file.at(0).get<std::size_t>()};
-  }
-  return content.substr(end + 1);
+  for (auto& [name, file] : pictures_of(content)) pictures_[name] = std::move(file);
+  return content.substr(content.find('\n') + 1);
 }
 
 void ExportFolder::write(const std::string& name, std::string_view content) {

@@ -40,8 +40,8 @@ class ExportFolder {
 
   // Writes a picture or mask. The unit's part lists it, and through it the manifest. Thread-safe.
   File write_picture(const std::string& name, std::span<const std::byte> content) const;
-  // Returns whether the unit has a part, which holds its records and lists their pictures. A part with
-  // another input digest, or with damaged bytes, does not count.
+  // Returns whether the unit has a part, which holds its records and lists their pictures. A part does not
+  // count if it has another input digest, or if it or one of its pictures is gone or damaged.
   bool has_part(std::int64_t unit, const std::string& input_digest);
   void save_part(std::int64_t unit, const std::string& input_digest, std::int64_t rows, std::string_view text,
                  const Files& pictures);
@@ -60,6 +60,7 @@ class ExportFolder {
 
  private:
   bool open_complete();
+  bool is_whole(const std::filesystem::path& part, const std::string& sha256) const;
   void open_parts();
   void drop_parts();
   void check_same(const nlohmann::ordered_json& found, const std::filesystem::path& file) const;

@@ -41,6 +41,15 @@ class Exports : public ::testing::Test {
     return export_dataset(made_.folder, {format, scratch_.path() / out, pictures_anyway, threads, true});
   }
 
+  // An export that fails after all pictures and parts are written: a folder has the name of its last file.
+  void stop_before_the_last_file(const std::string& out) {
+    const fs::path folder = scratch_.path() / out;
+    fs::create_directories(folder / ".parts");
+    fs::create_directory(folder / "croissant.json");
+    EXPECT_THROW(run(Format::coco, out), std::runtime_error);
+    fs::remove(folder / "croissant.json");
+  }
+
   std::map<std::string, std::string> files(const std::string& out) const {
     std::map<std::string, std::string> contents;
     for (const auto& entry : fs::recursive_directory_iterator(scratch_.path() / out)) {
@@ -230,6 +239,24 @@ TEST_F(Exports, AStoppedExportIsListedAsUnfinished) {
   EXPECT_FALSE(run(Format::coco, "coco").was_complete);
   EXPECT_EQ(dataset::listed_exports(out)[0].state, dataset::ExportState::complete);
   EXPECT_EQ(files("coco"), files("whole"));
+}
+
+// A run that was killed before its last file has written all pictures. They are compared when it goes on.
+TEST_F(Exports, PicturesThatWereLostSinceAreWrittenAgain) {
+  for (const bool removes : {true, false}) {
+    const std::string name = removes ? "removed" : "damaged";
+    run(Format::coco, "whole");
+    const auto expected = files("whole");
+    const std::string picture = json::parse(expected.at("export.json")).at("picture_files")[3].at("file");
+    stop_before_the_last_file(name);
+    if (removes) {
+      fs::remove(scratch_.path() / name / picture);
+    } else {
+      std::ofstream(scratch_.path() / name / picture) << "cut";
+    }
+    EXPECT_FALSE(run(Format::coco, name).was_complete);
+    EXPECT_EQ(files(name), expected) << name;
+  }
 }
 
 TEST_F(Exports, PicturesNeedAStatedLicence) {
