@@ -44,6 +44,13 @@ Findings find_problems(const fs::path& folder, bool quiet) {
   }
 }
 
+// Removes the temporary files that a killed repair may have left in a dataset.
+void remove_leftovers(const fs::path& folder) {
+  for (const fs::path& place : {folder, folder / "shards"}) {
+    if (fs::is_directory(place)) manifests::remove_temporaries(place);
+  }
+}
+
 // Moves a file to <out>/quarantine. Returns its new path, or nothing if the file is gone.
 std::optional<fs::path> quarantine(const fs::path& out, const fs::path& file) {
   if (!fs::exists(fs::symlink_status(file))) return std::nullopt;
@@ -138,6 +145,7 @@ RepairSummary repair(const fs::path& given, const std::optional<config::BuildCon
   {
     // A build that works meanwhile would have files that are not in its journal yet, which look damaged.
     const manifests::FolderLock lock(out);
+    remove_leftovers(summary.folder);
     before = find_problems(summary.folder, options.quiet);
     summary.problems = before.problems;
     if (before.problems.empty()) return summary;

@@ -88,6 +88,15 @@ TEST_F(Repair, AShardIsMadeAgainFromTheSources) {
   expect_as_before();
 }
 
+TEST_F(Repair, TemporaryFilesOfAKilledRepairAreRemoved) {
+  const std::vector<fs::path> left{first_.folder / ".dataset.json.Ab12Cd.tmp",
+                                   first_.folder / "shards/.000001.h5.Ab12Cd.tmp"};
+  for (const fs::path& file : left) write(file, "half");
+  EXPECT_THAT(mend().unrepaired, IsEmpty());
+  for (const fs::path& file : left) EXPECT_FALSE(fs::exists(file)) << file;
+  expect_as_before();
+}
+
 TEST_F(Repair, AShardWithACopyNeedsNoConfig) {
   const fs::path shard = first_.folder / "shards/000000.h5";
   fs::remove(shard);
