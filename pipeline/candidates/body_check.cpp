@@ -81,7 +81,7 @@ std::size_t records_of_one_call(const std::vector<manifests::SampleRecord>& reco
   std::size_t compared = 0;
   for (std::size_t i = 0; i < records.size(); ++i) {
     compared += is_compared(records[i]) ? 1 : 0;
-    if (compared == kMeshesAtOnce) return i + 1;
+    if (compared == kMeshesAtOnce || i + 1 == kMostRecordsOfOneCall) return i + 1;
   }
   return 0;
 }

@@ -29,8 +29,13 @@ struct BodyCheck {
 BodyCheck check_bodies(const device::BodyMeshes& bodies, bool take_body,
                        std::vector<manifests::SampleRecord>& records);
 
-// Returns how many of the first records fill one call of the body model, or 0 if there are too few. Calls are
-// always full because the last bits of a mesh may depend on the meshes that are posed with it.
+// Few of a dataset's records may have a body; so many records wait for a call at most.
+inline constexpr std::size_t kMostRecordsOfOneCall = 4096;
+
+// Returns how many of the first records fill one call of the body model: those up to its last mesh, or
+// kMostRecordsOfOneCall if they hold too few bodies. Returns 0 if there are too few records. Where a call
+// ends depends on the records alone, because the last bits of a mesh may depend on the meshes that are posed
+// with it.
 std::size_t records_of_one_call(const std::vector<manifests::SampleRecord>& records);
 
 // Adds the counts of further records, but not their findings.

@@ -50,6 +50,21 @@ class BodyCheckTest : public testing::Test {
   static inline device::BodyMeshes* bodies = nullptr;
 };
 
+TEST(RecordsOfOneCall, EndAtTheLastMeshOrAtABound) {
+  SampleRecord with_body;
+  manifests::BodyTruth& truth = with_body.truth.emplace();
+  truth.has_pose = truth.has_betas = true;
+  std::vector<SampleRecord> records(10);
+  records.resize(10 + 255, with_body);
+  EXPECT_EQ(records_of_one_call(records), 0U);
+  records.resize(10 + 300, with_body);
+  EXPECT_EQ(records_of_one_call(records), 10U + 256U);
+  std::vector<SampleRecord> without(kMostRecordsOfOneCall - 1);
+  EXPECT_EQ(records_of_one_call(without), 0U);
+  without.resize(kMostRecordsOfOneCall + 5);
+  EXPECT_EQ(records_of_one_call(without), kMostRecordsOfOneCall) << "records without bodies do not pile up";
+}
+
 TEST_F(BodyCheckTest, AgreesWithAFileOfTheSameBodyWhereverItsOriginLies) {
   std::vector<SampleRecord> records{consistent("a")};
   const BodyCheck check = check_bodies(*bodies, false, records);
