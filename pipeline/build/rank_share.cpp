@@ -56,7 +56,6 @@ void remove_leftovers(const std::filesystem::path& out) {
   }
 }
 
-// A word that no other run has.
 // Calls a function at the end of a block, however it ends.
 class AtEnd {
  public:
@@ -69,6 +68,7 @@ class AtEnd {
   std::function<void()> call_;
 };
 
+// Returns a word that no other run has.
 std::string new_run() {
   std::random_device random;
   return fmt::format("{:08x}{:08x}", random(), random());
