@@ -10,6 +10,7 @@
 
 #include "loaders/pictures/jpeg.h"
 #include "loaders/pictures/png.h"
+#include "manifests/digest.h"
 #include "manifests/file_descriptor.h"
 
 namespace q3d::loaders::pictures {
@@ -86,6 +87,14 @@ MaskKind kind_of(const cv::Mat& grey) {
              : MaskKind::silhouette;
 }
 
+// Completes what was decoded from the bytes of a file.
+template <typename Decoded>
+Decoded of_file(const std::filesystem::path& path, std::span<const std::byte> bytes, Decoded decoded) {
+  decoded.sha256 = manifests::sha256(bytes);
+  if (decoded.failure != Reason::none) decoded.detail = path.filename().string() + ": " + decoded.detail;
+  return decoded;
+}
+
 }  // namespace
 
 FileBytes read_picture_file(const std::filesystem::path& path) {
@@ -125,9 +134,7 @@ DecodedImage decode_image(std::span<const std::byte> bytes) {
 DecodedImage decode_image(const std::filesystem::path& path) {
   FileBytes file = read_picture_file(path);
   if (file.failure != Reason::none) return {{}, file.failure, std::move(file.detail)};
-  DecodedImage decoded = decode_image(file.bytes);
-  if (decoded.failure != Reason::none) decoded.detail = path.filename().string() + ": " + decoded.detail;
-  return decoded;
+  return of_file(path, file.bytes, decode_image(file.bytes));
 }
 
 DecodedMask decode_mask(std::span<const std::byte> bytes) {
@@ -146,9 +153,7 @@ DecodedMask decode_mask(const std::filesystem::path& path) {
   if (path.empty()) return {};
   FileBytes file = read_picture_file(path);
   if (file.failure != Reason::none) return {{}, MaskKind::absent, file.failure, std::move(file.detail)};
-  DecodedMask decoded = decode_mask(file.bytes);
-  if (decoded.failure != Reason::none) decoded.detail = path.filename().string() + ": " + decoded.detail;
-  return decoded;
+  return of_file(path, file.bytes, decode_mask(file.bytes));
 }
 
 }  // namespace q3d::loaders::pictures

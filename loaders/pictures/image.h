@@ -35,6 +35,7 @@ struct DecodedImage {
   cv::Mat rgb;  // 8-bit, 3 channels, RGB; empty when it failed
   manifests::Reason failure = manifests::Reason::none;
   std::string detail;
+  std::string sha256{};  // of the file whose bytes were decoded; empty if no file was read
 };
 
 // Decodes a picture. Grey, palette, alpha, 16-bit and CMYK pictures become 8-bit RGB as with PIL's
@@ -60,6 +61,7 @@ struct DecodedMask {
   MaskKind kind = MaskKind::absent;
   manifests::Reason failure = manifests::Reason::none;
   std::string detail;
+  std::string sha256{};  // of the file whose bytes were decoded; empty if no file was read
 };
 
 // Decodes a mask. Grey values are those of PIL's convert('L'). An empty path is an absent mask; a path that

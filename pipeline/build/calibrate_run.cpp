@@ -163,8 +163,9 @@ std::vector<bool> adapt_some(const std::vector<const Scored*>& candidates, const
   std::vector<manifests::SampleRecord> records(candidates.size());
   std::vector<std::vector<std::uint8_t>> patches(candidates.size());
   tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t i) {
-    records[i] = workspace.ingest().candidates.at(candidates[i]->candidate).record;
-    patches[i] = unit::decode_sample(records[i], {.patch = true}, config.shards).patch;
+    candidates::Candidate candidate = workspace.ingest().candidates.at(candidates[i]->candidate);
+    patches[i] = unit::decode_sample(candidate, {.patch = true}, config.shards).patch;
+    records[i] = std::move(candidate.record);
   });
   std::vector<device::AdaptRequest> requests;
   std::vector<std::size_t> positions;

@@ -77,10 +77,10 @@ class RecordEvaluator {
   static void decode(unit::UnitWork& work) {
     work.decoded.assign(work.candidates.size(), {});
     tbb::parallel_for(std::size_t{0}, work.candidates.size(), [&](std::size_t i) {
-      const manifests::SampleRecord& record = work.candidates[i].record;
-      if (run::interrupted() || record.failure != Reason::none) return;
+      const candidates::Candidate& candidate = work.candidates[i];
+      if (run::interrupted() || candidate.record.failure != Reason::none) return;
       work.decoded[i] =
-          unit::decode_sample(record, {.patch = true, .stored_crop = false, .mask_area = true}, {});
+          unit::decode_sample(candidate, {.patch = true, .stored_crop = false, .mask_area = true}, {});
     });
   }
 

@@ -16,6 +16,7 @@
 #include "manifests/atomic_file.h"
 #include "manifests/checked_line.h"
 #include "manifests/next_field.h"
+#include "pipeline/candidates/digested_file.h"
 #include "pipeline/run/interrupt.h"
 #include "pipeline/run/progress.h"
 
@@ -46,10 +47,7 @@ bool parse_hash(std::string_view digits, std::uint64_t& hash) {
 std::optional<PictureHash> hash_file(const PictureFile& picture) {
   const loaders::pictures::DecodedImage image =
       loaders::pictures::decode_image(std::filesystem::path(picture.path));
-  if (image.failure == manifests::Reason::image_missing) {  // it existed when it was digested
-    throw std::runtime_error(
-        fmt::format("{}: it could be read before and cannot now; put it back and run again", image.detail));
-  }
+  candidates::require_as_digested({picture.path, image.sha256, image.failure, image.detail}, picture.sha256);
   if (image.failure != manifests::Reason::none) return std::nullopt;
   return loaders::pictures::perceptual_hash(loaders::pictures::turned(image.rgb, picture.orientation));
 }

@@ -102,7 +102,7 @@ class Predictor {
     work.decoded.assign(work.candidates.size(), {});
     for (std::size_t i = 0; i < work.candidates.size(); ++i) {
       if (!adapts(work, i)) continue;
-      work.decoded[i] = unit::decode_sample(work.candidates[i].record, {.patch = true}, config_.shards);
+      work.decoded[i] = unit::decode_sample(work.candidates[i], {.patch = true}, config_.shards);
     }
   }
 

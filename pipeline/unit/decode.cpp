@@ -5,13 +5,13 @@
 
 #include <cmath>
 #include <opencv2/imgproc.hpp>
-#include <stdexcept>
 
 #include "loaders/pictures/box.h"
 #include "loaders/pictures/crop.h"
 #include "loaders/pictures/image.h"
 #include "loaders/pictures/orientation.h"
 #include "loaders/pictures/stored_crop.h"
+#include "pipeline/candidates/digested_file.h"
 #include "pipeline/run/interrupt.h"
 
 namespace q3d::pipeline::unit {
@@ -50,20 +50,34 @@ void add_provenance(const manifests::SampleRecord& record, std::string& detail) 
   if (record.scale != 1.0) add(fmt::format("box and keypoints are scaled by {:.6g}", record.scale));
 }
 
-// Throws if a picture that had a digest is gone now (an unmounted disk). This is not a failed sample.
-void require_present(const candidates::Candidate& candidate, const DecodedSample& decoded) {
-  if (decoded.failure != Reason::image_missing || candidate.image_sha256.empty()) return;
-  throw std::runtime_error(
-      fmt::format("{}: the picture {} could be read before and cannot now ({}); put it back and build again",
-                  candidate.record.id, candidate.record.image_path, decoded.detail));
+struct DecodedFiles {
+  loaders::pictures::DecodedImage image;
+  loaders::pictures::DecodedMask mask;  // absent if the picture failed
+};
+
+// Decodes a candidate's files, which must be those that were digested, if any were.
+DecodedFiles decode_files(const candidates::Candidate& candidate) {
+  const manifests::SampleRecord& record = candidate.record;
+  const auto require_same = [&](const std::string& path, const auto& decoded, const std::string& expected) {
+    if (candidate.image_sha256.empty()) return;
+    candidates::require_as_digested({path, decoded.sha256, decoded.failure, decoded.detail}, expected);
+  };
+  DecodedFiles files;
+  files.image = loaders::pictures::decode_image(record.image_path);
+  require_same(record.image_path, files.image, candidate.image_sha256);
+  if (files.image.failure != Reason::none) return files;
+  files.mask = loaders::pictures::decode_mask(record.mask_path);
+  require_same(record.mask_path, files.mask, candidate.mask_sha256);
+  return files;
 }
 
 }  // namespace
 
-DecodedSample decode_sample(const manifests::SampleRecord& record, Wanted want,
+DecodedSample decode_sample(const candidates::Candidate& candidate, Wanted want,
                             const config::ShardConfig& shards) {
+  const manifests::SampleRecord& record = candidate.record;
+  auto [image, mask] = decode_files(candidate);
   DecodedSample sample;
-  loaders::pictures::DecodedImage image = loaders::pictures::decode_image(record.image_path);
   if (image.failure != Reason::none) {
     sample.failure = image.failure;
     sample.detail = image.detail;
@@ -72,7 +86,6 @@ DecodedSample decode_sample(const manifests::SampleRecord& record, Wanted want,
   image.rgb = loaders::pictures::turned(image.rgb, record.orientation);
   // A mask that is absent, unreadable or no silhouette is dropped. If a file is named, the detail says what
   // is wrong with it.
-  loaders::pictures::DecodedMask mask = loaders::pictures::decode_mask(record.mask_path);
   mask.silhouette = fitted_mask(mask.silhouette, record, image.rgb.size());
   const bool has_mask = mask.silhouette.size() == image.rgb.size();
   if (!has_mask && mask.kind != loaders::pictures::MaskKind::absent) {
@@ -123,8 +136,7 @@ void decode_unit(UnitWork& work, const config::ShardConfig& shards, const config
   tbb::parallel_for(std::size_t{0}, work.candidates.size(), [&](std::size_t i) {
     if (run::interrupted()) return;
     if (const auto want = wanted(picture_facts(work, i, rules))) {
-      work.decoded[i] = decode_sample(work.candidates[i].record, *want, shards);
-      require_present(work.candidates[i], work.decoded[i]);
+      work.decoded[i] = decode_sample(work.candidates[i], *want, shards);
     }
   });
 }

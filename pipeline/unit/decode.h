@@ -9,9 +9,11 @@
 
 namespace q3d::pipeline::unit {
 
-// Decodes, checks and crops one candidate's picture. A bad picture is a failure in the result. Throws
-// manifests::IoError if a picture or mask is there and cannot be read.
-DecodedSample decode_sample(const manifests::SampleRecord& record, Wanted want,
+// Decodes, checks and crops one candidate's picture. A bad picture is a failure in the result. If the
+// candidate has digests, the bytes that are decoded must have them, so that provenance names what was used.
+// Throws manifests::IoError if a picture or mask is there and cannot be read, and std::runtime_error if one
+// is gone, or has other bytes, since it was digested.
+DecodedSample decode_sample(const candidates::Candidate& candidate, Wanted want,
                             const config::ShardConfig& shards);
 
 // Returns the area of a mask in the network's crop, in px of the crop, soft edges included. It is 0 if the
@@ -21,7 +23,7 @@ double mask_area_px(const std::string& mask_path, const manifests::Box& box, int
 
 // Fills work.decoded, in parallel, with the parts of each picture that later steps need (picture_needs.h).
 // `rules` may be null when only predictions are wanted; then no stored crops are made. Throws as
-// decode_sample does, and std::runtime_error if a picture is gone that existed when it was digested.
+// decode_sample does.
 void decode_unit(UnitWork& work, const config::ShardConfig& shards, const config::JudgingRules* rules);
 
 // Frees the pixels of stored crops that will not be encoded, because a verdict has dropped their candidates.

@@ -231,6 +231,29 @@ TEST_F(Rebuild, AnnotationsWithoutARecordAreTold) {
               ::testing::ThrowsMessage<std::runtime_error>(HasSubstr("there are no candidates")));
 }
 
+// A file whose bytes change while its size, time and inode stay keeps its remembered digest.
+class Rotten : public Rebuild, public ::testing::WithParamInterface<const char*> {};
+
+TEST_P(Rotten, APictureOrMaskIsNeverUsedUnderTheDigestOfItsEarlierBytes) {
+  const fs::path file = scratch_.path() / "data" / GetParam();
+  const auto earlier = fs::last_write_time(file) - std::chrono::hours(1);
+  fs::last_write_time(file, earlier);
+  run("out");
+  const std::string content = manifests::read_file(file);
+  flip_bit(file, content.size() / 2);
+  fs::last_write_time(file, earlier);
+  try {
+    run("out", /*jpeg_quality=*/90);
+    FAIL() << "the build has used the damaged file";
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), AllOf(HasSubstr(GetParam()), HasSubstr("replaced or damaged")));
+  }
+  write(file, content);
+  EXPECT_NO_THROW(run("out", /*jpeg_quality=*/90));
+}
+
+INSTANTIATE_TEST_SUITE_P(Files, Rotten, ::testing::Values("images/p3.png", "masks/m3.png"));
+
 TEST_F(Rebuild, APictureThatIsNotThereIsAFailedSample) {
   fs::remove(scratch_.path() / "data/images/p3.png");
   const BuildSummary summary = run("out");

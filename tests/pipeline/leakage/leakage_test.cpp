@@ -11,6 +11,7 @@
 
 #include "manifests/atomic_file.h"
 #include "manifests/csv.h"
+#include "manifests/digest.h"
 #include "pipeline/leakage/leakage_run.h"
 #include "pipeline/leakage/picture_hashes.h"
 #include "tests/support/paths.h"
@@ -234,10 +235,10 @@ TEST_F(Leakage, a_test_picture_that_cannot_be_read_is_told) {
 
 TEST_F(Leakage, hashes_are_made_once_for_a_content) {
   save("a.png", drawn(1));
-  const std::string sha(64, 'a');
-  const std::string other(64, 'b');
   const fs::path cache = scratch_.path() / "hashes.txt";
   std::ofstream(root() / "text.png") << "no picture";
+  const std::string sha = manifests::sha256_file(root() / "a.png");
+  const std::string other = manifests::sha256_file(root() / "text.png");
   PictureHashes first(cache);
   first.add({{(root() / "a.png").string(), sha}, {(root() / "text.png").string(), other}}, true);
   ASSERT_TRUE(first.find(sha));
@@ -254,6 +255,14 @@ TEST_F(Leakage, hashes_are_made_once_for_a_content) {
   EXPECT_FALSE(third.find(sha));
   EXPECT_THROW(third.add({{(root() / "a.png").string(), sha}}, true), std::runtime_error)
       << "a picture that was there a moment ago and is gone says nothing of its content";
+}
+
+TEST_F(Leakage, APictureThatIsNotTheDigestedOneIsNotHashedUnderItsDigest) {
+  save("a.png", drawn(1));
+  PictureHashes hashes(scratch_.path() / "hashes.txt");
+  const std::string sha(64, 'a');
+  EXPECT_THROW(hashes.add({{(root() / "a.png").string(), sha}}, true), std::runtime_error);
+  EXPECT_FALSE(hashes.find(sha));
 }
 
 }  // namespace
