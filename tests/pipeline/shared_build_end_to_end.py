@@ -174,6 +174,18 @@ class SharedBuild(SceneCase):
         self.wait_all(self.start_all(self.words("out"), 2))
         self.assert_equals_one("out")
 
+    def test_when_rank_0_fails_it_tells_why_and_the_next_start_completes(self):
+        """It fails within its first shard, while another thread tells of the other rank's units."""
+        store = own_store()
+        fault = Fault("shards-", "sync", error="EIO", skip=FIRST_SHARD_OF_RANK_0)
+        first, second = self.start(self.words("out"), 0, 2, store, fault), self.start(self.words("out"), 1, 2, store)
+        self.assertEqual(first.wait(), 1, first.stderr())
+        self.assertIn("check the disk", first.stderr())
+        self.assertIn(second.wait(), (0, 1), second.stderr())
+        self.assertFalse((self.folder / "out/latest").exists())
+        self.wait_all(self.start_all(self.words("out"), 2))
+        self.assert_equals_one("out")
+
     def test_a_rank_of_another_configuration_is_refused_and_the_others_finish(self):
         store = own_store()
         first = self.start(self.words("out"), 0, 2, store)

@@ -2,11 +2,13 @@
 
 import json
 import os
+import pathlib
 import re
 import shutil
+import signal
 import time
 
-from e2e import Fault, SceneCase, flip_bit, latest, verdicts
+from e2e import Fault, SceneCase, Started, environment, flip_bit, latest, program, verdicts
 
 
 class Unchanged(SceneCase):
@@ -80,6 +82,22 @@ class Unchanged(SceneCase):
         self.make_old()
         self.opened("data/images/")  # keeps the stamps
         self.assertEqual(self.opened("data/images/"), 0)
+
+    def test_a_program_that_is_replaced_while_it_works_leaves_no_record(self):
+        """Else the new program would take the work of the old one for its own."""
+        own = self.folder / "bin"
+        shutil.copytree(pathlib.Path(program()).parent, own)
+        words = [str(own / "quadruped3d"), *map(str, self.scene.build_words("replaced", config=self.config))]
+        running = Started(words, environment(Fault("dataset.json", "rename", "stop")))
+        self.addCleanup(running.kill)
+        self.assertTrue(running.wait_for_stop(), running.stderr())
+        for file in list(own.iterdir()):
+            shutil.copy(file, own / "new")
+            os.replace(own / "new", file)
+        running.send(signal.SIGCONT)
+        self.assertEqual(running.wait(), 0, running.stderr())
+        self.assertEqual(list((self.folder / "replaced/stages/builds").glob("*.stamps")), [])
+        self.assertNotEqual(list((self.folder / "out/stages/builds").glob("*.stamps")), [], "as a build leaves one")
 
     def test_changes_of_inputs_are_found(self):
         changes = {

@@ -8,8 +8,8 @@ import shutil
 import signal
 import subprocess
 
-from e2e import (DrawnCase, Fault, command, environment, latest, prima_dataset, run, verdicts, write_annotations,
-                 write_json)
+from e2e import (DrawnCase, Fault, command, draw_pictures, environment, give_bodies, latest, make_network,
+                 prima_dataset, run, verdicts, write_annotations, write_json)
 
 
 class Drawn(DrawnCase):
@@ -101,6 +101,28 @@ class Disks(Drawn):
         self.assertFalse((self.folder / "out/latest").exists())
         self.build("--no-sync", fault=Fault(".h5.", "sync", error=str(errno.EINVAL)))
         run("verify", self.folder / "out")
+
+    def training_words(self):
+        """Arguments of a training of one step on drawn pictures with bodies."""
+        data = self.folder / "bodies"
+        write_annotations(data, give_bodies(draw_pictures(data, 2)))
+        build = write_json(self.folder / "build.json", {"name": "bodies", "datasets": [prima_dataset(data, role="truth")]})
+        run("build", "--config", build, "--out", self.folder / "labels")
+        network = {"initial": "initial.safetensors", "smal_asset": "smal.safetensors", "priors": "priors.safetensors"}
+        paths = {key: str(self.folder / file) for key, file in network.items()}
+        make_network(paths["initial"], body=paths["smal_asset"], priors=paths["priors"])
+        config = write_json(self.folder / "training.json", {
+            "network": {**paths, "device": "cpu", "compute_threads": 1},
+            "pools": {"bodies": {"shards": [str(self.folder / "labels/latest")]}},
+            "stages": {"1": [{"name": "only", "pools": ["bodies"], "steps": 1, "learning_rate": 1e-3}]}, "batch": 2})
+        return ["train", "--config", config, "--stage", "1", "--out", self.folder / "trained"]
+
+    def test_a_disk_that_cannot_sync_takes_weights(self):
+        words = self.training_words()
+        fault = Fault("trained", "sync", error=str(errno.EINVAL))
+        self.assertIn("--no-sync", run(*words, fault=fault, expect=1).stderr)
+        run(*words, "--no-sync", fault=fault)
+        self.assertTrue((self.folder / "trained/model.safetensors").exists())
 
     def test_a_disk_without_locks(self):
         fault = Fault(".lock", "lock", error=str(errno.ENOLCK))

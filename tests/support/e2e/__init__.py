@@ -20,7 +20,7 @@ from .datasets import (copy_folder, digests, file_sha256, flip_bit, journal_line
                        units_in_journals, verdicts, write_safetensors)
 from .pictures import (FOCAL, draw_pictures, give_bodies, make_network, prima_dataset, render_world, smooth_picture,
                        world_animal3d, world_body, world_superanimal, write_annotations, write_json)
-from .program import (LIMIT_S, Fault, alarm_seconds, command, environment, fault_lines, kill_and_resume, program, run,
-                      run_json, started, wait_until)
+from .program import (LIMIT_S, Fault, Started, alarm_seconds, command, environment, fault_lines, kill_and_resume, program,
+                      run, run_json, started, wait_until)
 from .ranks import Rank, launcher_store, own_store
 from .scene import PICTURES, UNIT, DrawnCase, Scene, SceneCase
