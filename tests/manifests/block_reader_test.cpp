@@ -54,7 +54,7 @@ TEST_F(LineReaderTest, GoesOnAfterTheServerForgotTheFile) {
   const std::string text = std::string(500'000, 'x') + "\nlast\n";
   write_file_atomically(scratch_.path() / "file", text);
   LineReader reader(scratch_.path() / "file");
-  const testing::FailingIo io(testing::Call::read, "/file", ESTALE, 1);
+  const testing::FailingIo io(testing::Call::read_forgotten, "/file", ESTALE);
   EXPECT_EQ(reader.next()->size(), 500'000U);
   EXPECT_EQ(reader.next(), "last");
   EXPECT_EQ(io.failures(), 1);

@@ -42,7 +42,7 @@ class Reopened : public ::testing::Test {
   std::string later(const std::function<void()>& meanwhile, const char* name = "/file") const {
     const ReopenedFile file(path_);
     meanwhile();
-    const FailingIo io(Call::read, name, ESTALE, 2);
+    const FailingIo io(Call::read_forgotten, name, ESTALE);
     return read(file, 4, 6);
   }
   void write_again() const {
@@ -79,7 +79,7 @@ TEST_F(Reopened, IsRefusedIfTheServerForgetsItAgainAndAgain) {
 
 TEST_F(Reopened, ManyThreadsReadWhatTheyAskFor) {
   const ReopenedFile file(path_);
-  const FailingIo io(Call::read, "/file", ESTALE, 3);
+  const FailingIo io(Call::read_forgotten, "/file", ESTALE);
   std::atomic<int> wrong = 0;
   std::vector<std::jthread> threads;
   for (std::size_t i = 0; i < 8; ++i) {
@@ -90,7 +90,7 @@ TEST_F(Reopened, ManyThreadsReadWhatTheyAskFor) {
   }
   threads.clear();
   EXPECT_EQ(wrong, 0);
-  EXPECT_EQ(io.failures(), 3);
+  EXPECT_GE(io.failures(), 1);
 }
 
 // Training keeps its shards open for days.
@@ -100,7 +100,7 @@ TEST_F(Reopened, ATableIsReadOn) {
   table.text["name"] = {"lynx", "okapi"};
   write_table(path_, table);
   const TableReader reader(path_);
-  const FailingIo io(Call::read, "/file", ESTALE, 1);
+  const FailingIo io(Call::read_forgotten, "/file", ESTALE);
   EXPECT_THAT(reader.text("name", 0, 2), ElementsAre("lynx", "okapi"));
   EXPECT_EQ(io.failures(), 1);
 }

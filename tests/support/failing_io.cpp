@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <cstdarg>
 #include <mutex>
+#include <set>
 #include <stdexcept>
 #include <string_view>
 
@@ -25,6 +26,7 @@ struct Plan {
 
 std::mutex mutex;
 const Plan* plan = nullptr;  // guarded by mutex
+std::set<int> opened_later;  // descriptors that were opened while the plan was there; guarded by mutex
 std::atomic<int> failed = 0;
 
 // Returns the errno with which the call must fail, or 0 if it must pass.
@@ -41,7 +43,16 @@ int open_or_fail(const char* path, int flags, mode_t mode) {
     errno = code;
     return -1;
   }
-  return static_cast<int>(::syscall(SYS_openat, AT_FDCWD, path, flags, mode));
+  const int descriptor = static_cast<int>(::syscall(SYS_openat, AT_FDCWD, path, flags, mode));
+  const std::lock_guard lock(mutex);
+  if (plan != nullptr) opened_later.insert(descriptor);
+  return descriptor;
+}
+
+Call call_of_read(int descriptor) {
+  const std::lock_guard lock(mutex);
+  const bool asks_for_age = plan != nullptr && plan->call == Call::read_forgotten;
+  return asks_for_age && !opened_later.contains(descriptor) ? Call::read_forgotten : Call::read;
 }
 
 ssize_t read_or_fail(int descriptor, void* buffer, std::size_t count, off_t offset) {
@@ -49,7 +60,7 @@ ssize_t read_or_fail(int descriptor, void* buffer, std::size_t count, off_t offs
   const std::string link = "/proc/self/fd/" + std::to_string(descriptor);
   const ssize_t length = ::readlink(link.c_str(), path.data(), path.size());
   if (length > 0) {
-    if (const int code = verdict(Call::read, {path.data(), static_cast<std::size_t>(length)})) {
+    if (const int code = verdict(call_of_read(descriptor), {path.data(), static_cast<std::size_t>(length)})) {
       errno = code;
       return -1;
     }
@@ -76,6 +87,7 @@ FailingIo::FailingIo(Call call, std::string ending, int code, int times) {
   const std::lock_guard lock(mutex);
   if (plan != nullptr) throw std::logic_error("one FailingIo at a time");
   failed = 0;
+  opened_later.clear();
   plan = new Plan{call, std::move(ending), code, times};
 }
 

@@ -8,7 +8,12 @@
 
 namespace q3d::testing {
 
-enum class Call { open, read, inspect };
+enum class Call {
+  open,
+  read,
+  read_forgotten,  // reads through descriptors that were open when the object was made
+  inspect
+};
 
 // While it lives, `call` on every file whose path ends in `ending` fails with errno `code`: `times` times, or
 // always if that is negative. Only one object may exist at a time.
