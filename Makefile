@@ -65,10 +65,11 @@ fuzz: setup  ## fuzz every reader of files for FUZZ_SECONDS each (clang; tests/f
 	cmake --build build/fuzz --parallel $(JOBS) --target fuzz_targets
 	tools/fuzz.sh build/fuzz $(FUZZ_SECONDS) $(FUZZ_TARGETS)
 
-tsan: setup  ## tests of what threads share under the thread sanitizer, without LibTorch and oneTBB
+tsan: setup  ## tests of what threads share under the thread sanitizer, with a oneTBB that is compiled for it
+	tools/sanitized_tbb.sh build/tsan-tbb
 	cmake --preset tsan
 	cmake --build build/tsan --parallel $(JOBS) --target tsan_tests
-	TSAN_OPTIONS=second_deadlock_stack=1 \
+	TSAN_OPTIONS="second_deadlock_stack=1 suppressions=$(CURDIR)/tests/tsan.suppressions" \
 	  ctest --test-dir build/tsan --output-on-failure --parallel $(JOBS) -R "$$(cat build/tsan/tsan_tests.txt)"
 
 torture: build  ## kills, damaged files, failing calls, pauses, power cuts (docs/reliability.md); compares what is left
