@@ -57,11 +57,11 @@ void publish_units(const config::BuildConfig& config, const config::JudgingRules
 
 // Makes this rank's units. In rank 0 the dataset can then be published, unless the request ends at an earlier
 // stage.
-void make_units(const config::JudgingRules& rules, const BuildRequest& request, RankShare& ranks,
-                Workspace& workspace, BuildSummary& summary) {
+void make_units(const config::BuildConfig& config, const config::JudgingRules& rules,
+                const BuildRequest& request, RankShare& ranks, Workspace& workspace, BuildSummary& summary) {
   const stages::Stage until = request.until.value_or(stages::Stage::shards);
   const auto make = [&] {
-    return std::make_unique<UnitBuilder>(ranks.config(), rules, summary.plan.keys, until, workspace, ranks);
+    return std::make_unique<UnitBuilder>(config, rules, summary.plan.keys, until, workspace, ranks);
   };
   std::unique_ptr<UnitBuilder> units;
   if (ranks.leads() && !summary.was_up_to_date) units = make();  // takes over the results of an earlier run
@@ -73,16 +73,17 @@ void make_units(const config::JudgingRules& rules, const BuildRequest& request, 
   if (request.until) {
     summary.stopped_after = until;
   } else if (ranks.leads()) {
-    publish_units(ranks.config(), rules, workspace, summary, *units);
+    publish_units(config, rules, workspace, summary, *units);
   }
 }
 
 // Makes the units of a rank other than 0. Rank 0 may have ended already if other ranks made the last units
 // too; this is no error.
-void make_units_beside_leader(const config::JudgingRules& rules, const BuildRequest& request,
-                              RankShare& ranks, Workspace& workspace, BuildSummary& summary) {
+void make_units_beside_leader(const config::BuildConfig& config, const config::JudgingRules& rules,
+                              const BuildRequest& request, RankShare& ranks, Workspace& workspace,
+                              BuildSummary& summary) {
   try {
-    make_units(rules, request, ranks, workspace, summary);
+    make_units(config, rules, request, ranks, workspace, summary);
   } catch (const LeaderLost&) {
     if (!std::filesystem::exists(summary.folder / "dataset.json")) throw;
   }
@@ -142,7 +143,9 @@ BuildSummary build(const config::BuildConfig& config, const run::RunOptions& opt
                    const BuildRequest& request) {
   const auto start = Clock::now();
   const config::JudgingRules rules = checked_rules(config, options.above_ceiling);
-  RankShare ranks(config, options, "build");
+  RankShare ranks(config::needs_network(config) ? &config.network : nullptr, options, "build");
+  config::BuildConfig own = config;
+  own.network = ranks.own(config.network);
   BuildSummary summary;
   summary.rank = ranks.rank();
   const UpToDateRecord record(options.out, config, rules, device_of(config));
@@ -153,22 +156,21 @@ BuildSummary build(const config::BuildConfig& config, const run::RunOptions& opt
     return summary;
   }
   if (!ranks.await_digests()) return summary;
-  Workspace workspace(ranks.config(), ranks.options(),
-                      ranks.leads() ? Workspace::Use::work : Workspace::Use::join);
+  Workspace workspace(own, ranks.options(), ranks.leads() ? Workspace::Use::work : Workspace::Use::join);
   ranks.tell_digests();
   summary.plan = stages::plan_of(config, rules, workspace.ingest(), workspace.assets(),
                                  workspace.device_key(), request.command);
   const stages::StageKeys& keys = summary.plan.keys;
   summary.folder = version_folder(options.out, config, keys);
   if (!ranks.leads()) {
-    make_units_beside_leader(rules, request, ranks, workspace, summary);
+    make_units_beside_leader(own, rules, request, ranks, workspace, summary);
     return summary;
   }
   stages::write_build_plan(options.out, summary.plan);
   summary.notes = workspace.ingest().notes;
   summary.was_up_to_date = dataset::is_published(summary.folder, keys.dataset) && !options.rebuild;
   workspace.digests().save();
-  make_units(rules, request, ranks, workspace, summary);
+  make_units(own, rules, request, ranks, workspace, summary);
   ranks.end();
   if (summary.stopped_after) {
     summary.seconds = seconds_since(start);

@@ -323,15 +323,16 @@ CalibrationSummary calibrate(const config::BuildConfig& config, const run::RunOp
         "calibrate: `build` needs no thresholds here");
   }
   const auto start = std::chrono::steady_clock::now();
-  RankShare ranks(config, options, "calibrate");
+  RankShare ranks(&config.network, options, "calibrate");
+  config::BuildConfig own = config;
+  own.network = ranks.own(config.network);
   ranks.await_digests();
-  Workspace workspace(ranks.config(), ranks.options(),
-                      ranks.leads() ? Workspace::Use::work : Workspace::Use::join);
+  Workspace workspace(own, ranks.options(), ranks.leads() ? Workspace::Use::work : Workspace::Use::join);
   ranks.tell_digests();
   CalibrationSummary summary;
   summary.rank = ranks.rank();
   summary.candidates = static_cast<std::int64_t>(workspace.ingest().candidates.size());
-  const std::vector<Scored> scored = predict_pool(ranks.config(), workspace, ranks);
+  const std::vector<Scored> scored = predict_pool(own, workspace, ranks);
   if (!ranks.leads()) return summary;
   for (const auto& [dataset, candidates] : split_pool(scored, config)) {
     summary.pools.push_back(calibrate_pool(dataset, candidates, config, workspace));

@@ -38,9 +38,8 @@ RankPlace find_place(bool shares_units) {
   }
 }
 
-void require_stated_threads(const config::BuildConfig& config) {
-  if (!config::needs_network(config) || config.network.compute_threads > 0) return;
-  if (!network::device_key(config.network).starts_with("cpu")) return;
+void require_stated_threads(const config::NetworkConfig& network) {
+  if (network.compute_threads > 0 || !network::device_key(network).starts_with("cpu")) return;
   throw run::ConfigError(
       "network.compute_threads is 0, which may mean all cores of a machine, and its number decides the last "
       "bits of a "
@@ -76,12 +75,11 @@ std::string new_run() {
 
 }  // namespace
 
-RankShare::RankShare(const config::BuildConfig& config, const run::RunOptions& options,
+RankShare::RankShare(const config::NetworkConfig* network, const run::RunOptions& options,
                      const std::string& purpose)
-    : place_(find_place(options.shares_units)), config_(config), options_(options) {
+    : place_(find_place(options.shares_units)), options_(options) {
   if (!is_shared()) return;
-  require_stated_threads(config);
-  config_.network.local_rank = place_.local_rank;
+  if (network != nullptr) require_stated_threads(*network);
   if (options_.threads == 0) options_.threads = model::ranks::own_cores(place_);
   if (!leads()) options_.quiet = true;
   if (leads()) run_ = new_run();
@@ -103,6 +101,11 @@ RankShare::~RankShare() {
   } catch (const std::exception&) {
     // The other ranks notice that this rank no longer gives signs of life.
   }
+}
+
+config::NetworkConfig RankShare::own(config::NetworkConfig network) const {
+  if (is_shared()) network.local_rank = place_.local_rank;
+  return network;
 }
 
 void RankShare::keep_alive(const std::stop_token& stop) {

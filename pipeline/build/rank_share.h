@@ -34,9 +34,9 @@ class LeaderLost : public std::runtime_error {
 class RankShare {
  public:
   // The ranks are those of the environment if options.shares_units is set, else this process is alone. Rank 0
-  // waits for nobody. Throws ConfigError, also for a network on the CPU without a number of compute_threads,
-  // and std::runtime_error if rank 0 is not reached in time.
-  RankShare(const config::BuildConfig& config, const run::RunOptions& options, const std::string& purpose);
+  // waits for nobody. `network` is null if the work needs none. Throws ConfigError, also for a network on the
+  // CPU without a number of compute_threads, and std::runtime_error if rank 0 is not reached in time.
+  RankShare(const config::NetworkConfig* network, const run::RunOptions& options, const std::string& purpose);
   ~RankShare();
   RankShare(const RankShare&) = delete;
   RankShare& operator=(const RankShare&) = delete;
@@ -45,9 +45,9 @@ class RankShare {
   bool leads() const { return place_.rank == 0; }
   int rank() const { return place_.rank; }
 
-  // These return the config with this rank's GPU, and the options with its part of the machine's cores. All
-  // ranks but rank 0 are quiet.
-  const config::BuildConfig& config() const { return config_; }
+  // Returns the settings of the network with this rank's GPU.
+  config::NetworkConfig own(config::NetworkConfig network) const;
+  // Returns the options with this rank's part of the machine's cores. All ranks but rank 0 are quiet.
   const run::RunOptions& options() const { return options_; }
 
   // Rank 0 digests the pictures; the others read the candidates when its digests are there. The others wait
@@ -83,7 +83,6 @@ class RankShare {
   void say_farewell();
 
   model::ranks::RankPlace place_;
-  config::BuildConfig config_;
   run::RunOptions options_;
   std::string run_;
   std::unique_ptr<model::ranks::SharedStore> store_;  // null if this process is alone

@@ -91,24 +91,6 @@ void check_role(config::Role role, manifests::SampleRecord& record) {
       "pose: got nothing, or zeros throughout; expected 35 rotations, since the dataset's role is \"truth\"";
 }
 
-// Digests pictures and masks. A missing picture fails its sample, never the build; a missing mask counts as
-// no mask. A file that exists and cannot be read stops the run.
-void digest_pictures(std::span<Candidate> candidates, manifests::DigestCache& digests) {
-  tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t i) {
-    Candidate& candidate = candidates[i];
-    if (candidate.record.failure != Reason::none || run::interrupted()) return;
-    if (auto digest = digests.digest_if_present(candidate.record.image_path)) {
-      candidate.image_sha256 = std::move(*digest);
-    } else {
-      candidate.record.failure = Reason::image_missing;
-      candidate.record.failure_detail = candidate.record.image_ref + " cannot be read";
-    }
-    if (candidate.record.mask_path.empty()) return;
-    candidate.mask_sha256 = digests.digest_if_present(candidate.record.mask_path).value_or("");
-  });
-  run::throw_if_interrupted();
-}
-
 // Returns the terms of the datasets as the config states them, as text, by dataset_key. A dataset without
 // terms is left out.
 std::map<std::string, std::string> texts_of_terms(const config::BuildConfig& config) {
@@ -248,6 +230,22 @@ void ingest_dataset(const config::DatasetConfig& options, manifests::DigestCache
 }
 
 }  // namespace
+
+void digest_pictures(std::span<Candidate> candidates, manifests::DigestCache& digests) {
+  tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t i) {
+    Candidate& candidate = candidates[i];
+    if (candidate.record.failure != Reason::none || run::interrupted()) return;
+    if (auto digest = digests.digest_if_present(candidate.record.image_path)) {
+      candidate.image_sha256 = std::move(*digest);
+    } else {
+      candidate.record.failure = Reason::image_missing;
+      candidate.record.failure_detail = candidate.record.image_ref + " cannot be read";
+    }
+    if (candidate.record.mask_path.empty()) return;
+    candidate.mask_sha256 = digests.digest_if_present(candidate.record.mask_path).value_or("");
+  });
+  run::throw_if_interrupted();
+}
 
 bool is_rendered(const std::filesystem::path& root) {
   const std::filesystem::path folder = std::filesystem::absolute(root / ".").lexically_normal().parent_path();

@@ -75,6 +75,11 @@ struct Ingest {
 Ingest ingest(const config::BuildConfig& config, manifests::DigestCache& digests,
               const device::BodyMeshesLoader& load_bodies, const std::filesystem::path& folder);
 
+// Sets the digests of the pictures and masks of candidates that have not failed. A missing picture fails its
+// candidate; a missing mask counts as no mask. Throws manifests::IoError for a file that exists and cannot be
+// read, and Interrupted.
+void digest_pictures(std::span<Candidate> candidates, manifests::DigestCache& digests);
+
 // Returns whether the dataset in this folder is part of a world that `sample` rendered. If so, the folder or
 // the one above it holds the world's world.json. Pictures without this mark count as photographs.
 bool is_rendered(const std::filesystem::path& root);

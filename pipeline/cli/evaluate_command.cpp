@@ -20,7 +20,6 @@ namespace {
 struct Arguments {
   ConfigArguments config;
   std::filesystem::path checkpoint;
-  std::filesystem::path out;
   evaluation::EvaluationOptions options;
   bool species = false;
   bool paper_tables = false;
@@ -32,7 +31,7 @@ void write_paper_tables(const Arguments& arguments, const evaluation::Evaluation
   const bool is_rendered = std::any_of(result.datasets.begin(), result.datasets.end(),
                                        [](const auto& dataset) { return dataset.is_rendered; });
   const std::string text = evaluation::paper_tables(tables, is_rendered);
-  manifests::write_file_atomically(arguments.out / "paper_tables.md", text);
+  manifests::write_file_atomically(arguments.options.run.out / "paper_tables.md", text);
   fmt::print(arguments.json ? stderr : stdout, "\n{}", text);
 }
 
@@ -47,13 +46,12 @@ void write_adaptation_figure(const std::filesystem::path& out, const evaluation:
   }
 }
 
-int run(const Arguments& arguments) {
-  const auto config = evaluation::load_evaluation_config(arguments.config.files, arguments.checkpoint,
-                                                         arguments.config.settings());
-  const evaluation::Evaluation result = evaluation::evaluate(config, arguments.options);
+// Writes the results of rank 0 and tells about them.
+void report(const Arguments& arguments, const evaluation::Evaluation& result) {
+  const std::filesystem::path& out = arguments.options.run.out;
   const evaluation::Tables tables = evaluation::make_tables(result);
-  evaluation::write_evaluation(arguments.out, result, tables);
-  write_adaptation_figure(arguments.out, tables);
+  evaluation::write_evaluation(out, result, tables);
+  write_adaptation_figure(out, tables);
   if (!result.device_warning.empty()) fmt::print(stderr, "warning: {}\n", result.device_warning);
   for (const auto& dataset : result.datasets) {
     for (const std::string& note : dataset.notes) fmt::print(stderr, "note: {}: {}\n", dataset.name, note);
@@ -67,8 +65,15 @@ int run(const Arguments& arguments) {
       people,
       "all samples: {}\nTo test whether another network is better, evaluate it too, and give `quadruped3d "
       "compare` both folders.\n",
-      (arguments.out / "samples.csv").string());
+      (out / "samples.csv").string());
   if (arguments.json) fmt::print("{}\n", evaluation::to_json(result, tables).dump());
+}
+
+int run(const Arguments& arguments) {
+  const auto config = evaluation::load_evaluation_config(arguments.config.files, arguments.checkpoint,
+                                                         arguments.config.settings());
+  evaluation::evaluate(config, arguments.options,
+                       [&](const evaluation::Evaluation& result) { report(arguments, result); });
   return 0;
 }
 
@@ -99,6 +104,7 @@ void add_settings(CLI::App& command, evaluation::EvaluationOptions& options) {
 
 Command add_evaluate(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
+  arguments->options.run.shares_units = true;
   CLI::App* command = declare(app, "evaluate");
   config_option(*command, arguments->config)->required();
   device_option(*command, arguments->config);
@@ -106,15 +112,16 @@ Command add_evaluate(CLI::App& app) {
       ->add_option("--checkpoint", arguments->checkpoint,
                    "weights to measure, instead of the config's network.checkpoint")
       ->check(CLI::ExistingFile);
-  out_option(*command, arguments->out, "folder for evaluation.json, samples.csv and tables.csv")->required();
+  out_option(*command, arguments->options.run.out, "folder for evaluation.json, samples.csv and tables.csv")
+      ->required();
   add_settings(*command, arguments->options);
   command->add_flag(
       "--paper-tables", arguments->paper_tables,
       "also print the paper's tables with the paper's numbers, and write them to OUT/paper_tables.md");
   command->add_flag("--species", arguments->species, "also show the table by species");
-  threads_option(*command, arguments->options.threads);
+  threads_option(*command, arguments->options.run.threads);
   json_flag(*command, arguments->json, "print evaluation.json to stdout");
-  quiet_flag(*command, arguments->options.quiet);
+  quiet_flag(*command, arguments->options.run.quiet);
   command->footer(
       "Examples:\n"
       "  quadruped3d evaluate --config configs/world_evaluation.json \\\n"
@@ -122,7 +129,9 @@ Command add_evaluate(CLI::App& app) {
       "  quadruped3d evaluate -c my.json -o out/eval --limit 50                      a quick look\n"
       "  quadruped3d evaluate -c my.json -o out/eval --tta 30 --visible 0.7,0.5,0.3  with adaptation\n"
       "  quadruped3d evaluate -c my.json -o out/eval --tta-curve 0,5,10,20,30,50,70  does it overfit?\n"
-      "docs/evaluation.md defines every number.");
+      "An evaluation that was stopped goes on with the same command. Ranks that torchrun or srun starts "
+      "share\n"
+      "it (docs/scale.md). docs/evaluation.md defines every number.");
   return [arguments] { return run(*arguments); };
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "pipeline/evaluation/evaluation_config.h"
 #include "pipeline/evaluation/metric.h"
 #include "pipeline/evaluation/setting.h"
+#include "pipeline/run/run_options.h"
 
 namespace q3d::pipeline::evaluation {
 
@@ -18,8 +20,7 @@ struct EvaluationOptions {
   std::int64_t limit = 0;       // samples of each dataset, evenly spaced; 0 = all
   std::uint64_t seed = 0;       // seed of hidden keypoints and of k-means
   bool official_means = false;  // a sample without a value counts as 0
-  int threads = 0;              // threads that read and decode; 0 = all cores; never changes a byte
-  bool quiet = false;           // no progress
+  run::RunOptions run;          // the folder for the results, threads, progress, ranks
 };
 
 using Betas = std::array<float, manifests::kNumBetas>;
@@ -58,10 +59,15 @@ struct Evaluation {
   std::vector<Setting> settings;
   std::vector<DatasetResult> datasets;
   double seconds = 0.0;
+  int rank = 0;  // the results are complete in rank 0 alone
 };
 
-// Predicts and, if requested, adapts every sample in batches. A bad sample gives a result with a reason.
-// Throws ConfigError, std::runtime_error, Interrupted.
-Evaluation evaluate(const EvaluationConfig& config, const EvaluationOptions& options);
+// Predicts and, if requested, adapts every sample in batches, and calls `write` in rank 0 to write the
+// results. A bad sample gives a result with a reason. Until the results are written, finished units lie in
+// <out>/.parts; the same evaluation goes on from there if it was stopped. Ranks share the units if
+// options.run.shares_units is set. Throws ConfigError, std::runtime_error, Interrupted, and what `write`
+// throws.
+Evaluation evaluate(const EvaluationConfig& config, const EvaluationOptions& options,
+                    const std::function<void(const Evaluation&)>& write);
 
 }  // namespace q3d::pipeline::evaluation
