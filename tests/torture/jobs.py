@@ -26,7 +26,7 @@ _JOURNAL = re.compile(r"(^|/)journal\.jsonl$")
 _TEMPORARY = re.compile(r"\.tmp$|\.safetensors\..{6}$|^latest\.tmp$")
 
 # The jobs are in the order of the trials. shared_build is that of shared_build.py.
-JOBS = ("labels", "network", "calibrate", "train", "leakage", "merge", "export", "sample", "shared_build")
+JOBS = ("labels", "network", "calibrate", "train", "evaluate", "leakage", "merge", "export", "sample", "shared_build")
 
 
 def result_of(out):
@@ -176,6 +176,13 @@ class Inputs:
             "stages": {"1": [{"name": "only", "pools": ["truth"], "steps": 4, "learning_rate": 1e-3}]},
             "batch": 2, "log_every": 1, "checkpoint_every": 1})
         return lambda out: ["train", "--config", config, "--stage", "1", "--out", out, "--quiet"]
+
+    def evaluate(self):
+        config = write_json(self.shared / "evaluation.json", {
+            "datasets": [prima_dataset(self.data, name) for name in ("one", "two", "three")],
+            "network": {"checkpoint": str(self.scene.network), "smal_asset": str(self.scene.body), "device": "cpu",
+                        "compute_threads": 1}})
+        return lambda out: ["evaluate", "--config", config, "--out", out, "--tta", 1, "--quiet"]
 
     def leakage(self):
         config = write_json(self.shared / "leakage.json", {
