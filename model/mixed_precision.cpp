@@ -4,6 +4,23 @@
 #include <ATen/cpu/Utils.h>
 
 namespace q3d::model {
+namespace {
+
+bool processor_has(const char* capability) {
+  const auto capabilities = at::cpu::get_cpu_capabilities();
+  const auto found = capabilities.find(capability);
+  return found != capabilities.end() && found->second.toBool();
+}
+
+bool is_amd() {
+#if defined(__x86_64__)
+  return __builtin_cpu_is("amd") != 0;
+#else
+  return false;
+#endif
+}
+
+}  // namespace
 
 MixedPrecision::MixedPrecision(torch::Device device, bool enabled)
     : kind_(device.type()),
@@ -20,11 +37,13 @@ MixedPrecision::~MixedPrecision() {
   at::autocast::set_autocast_dtype(kind_, previous_dtype_);
 }
 
+bool multiplies_in_bfloat16(torch::Device device) {
+  return !device.is_cpu() || processor_has("avx512_bf16");
+}
+
 bool bfloat16_is_fast(torch::Device device) {
-  if (!device.is_cpu()) return true;
-  const auto capabilities = at::cpu::get_cpu_capabilities();
-  const auto found = capabilities.find("avx512_bf16");
-  return found != capabilities.end() && found->second.toBool();
+  if (!multiplies_in_bfloat16(device)) return false;
+  return !device.is_cpu() || is_amd() || processor_has("amx_bf16");
 }
 
 }  // namespace q3d::model

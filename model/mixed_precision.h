@@ -22,8 +22,12 @@ class MixedPrecision {
   torch::ScalarType previous_dtype_;
 };
 
-// Returns whether bfloat16 saves time on `device`: GPUs and x86 processors that multiply it themselves
-// (AVX512_BF16). On others LibTorch's convolutions in it are about ten times slower than in float32.
+// Returns whether `device` multiplies in bfloat16 itself: GPUs and x86 processors with AVX512_BF16. On others
+// LibTorch's convolutions in it are about ten times slower than in float32.
+bool multiplies_in_bfloat16(torch::Device device);
+
+// Returns whether training in bfloat16 saves time on `device`: on GPUs, on AMD's processors with AVX512_BF16,
+// and on Intel's if they have AMX too (docs/results.md).
 bool bfloat16_is_fast(torch::Device device);
 
 }  // namespace q3d::model

@@ -274,7 +274,7 @@ class Run {
     tell_left_out();
     if (options.quiet) return;
     if (!device_.warning.empty()) run::log_warning(device_.warning);
-    if (config_.network.precision == Precision::bfloat16 && !model::bfloat16_is_fast(device_.device)) {
+    if (config_.network.precision == Precision::bfloat16 && !model::multiplies_in_bfloat16(device_.device)) {
       run::log_warning(
           "this processor does not multiply in bfloat16 (AVX512_BF16), so convolutions in it are about ten "
           "times slower than in float32; \"precision\": \"auto\" takes the faster");

@@ -154,9 +154,9 @@ const Settings<TrainingNetworkConfig>& training_network_settings() {
        .description =
            "number type of the forward pass's matrix products. `bfloat16` uses LibTorch's autocast; weights, "
            "losses, body model and optimiser stay in float32. On x86 it is faster only if the processor "
-           "multiplies in bfloat16 (AVX512_BF16). Without AVX-512, LibTorch's bfloat16 convolutions are "
-           "about ten times slower than float32, and a warning says so. `auto` takes bfloat16 on a GPU or "
-           "such a processor, else float32",
+           "multiplies in bfloat16 (AVX512_BF16), on Intel's only if it has AMX too. Without AVX-512, "
+           "LibTorch's bfloat16 convolutions are about ten times slower than float32, and a warning says "
+           "so. `auto` takes bfloat16 on a GPU or such a processor, else float32",
        .words = texts(precision_names()),
        .decides = DecidedStage::weights},
       {.key = "compute_threads",
