@@ -125,6 +125,18 @@ std::vector<SampleResult> evaluate_pool(const Pool& pool, const Instruments& ins
   return evaluator.take_results();
 }
 
+// The same for a rank other than 0. Rank 0 may have ended already if other ranks made the last units too;
+// this is no error if it has completed the evaluation, which removes the parts.
+void evaluate_beside_leader(const Pool& pool, const Instruments& instruments, Machinery& machinery,
+                            const std::filesystem::path& parts, const std::string& key,
+                            build::RankShare& ranks) {
+  try {
+    evaluate_pool(pool, instruments, machinery, parts, key, ranks);
+  } catch (const build::LeaderLost&) {
+    if (std::filesystem::exists(parts)) throw;
+  }
+}
+
 // Gives every test set the results of its samples.
 void hand_out(std::vector<SampleResult>&& results, std::vector<DatasetResult>& datasets) {
   auto next = std::make_move_iterator(results.begin());
@@ -162,10 +174,12 @@ Evaluation evaluate(const EvaluationConfig& given, const EvaluationOptions& opti
   evaluation.device = machinery.network->device_description();
   evaluation.device_warning = machinery.network->device_warning();
   const Instruments instruments{&plan, machinery.meshes.get(), machinery.network.get(), options.seed};
-  std::vector<SampleResult> results = evaluate_pool(pool, instruments, machinery, parts.folder(),
-                                                    key_of_results(config, plan, evaluation), ranks);
-  if (!ranks.leads()) return evaluation;
-  hand_out(std::move(results), evaluation.datasets);
+  const std::string key = key_of_results(config, plan, evaluation);
+  if (!ranks.leads()) {
+    evaluate_beside_leader(pool, instruments, machinery, parts.folder(), key, ranks);
+    return evaluation;
+  }
+  hand_out(evaluate_pool(pool, instruments, machinery, parts.folder(), key, ranks), evaluation.datasets);
   evaluation.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   write(evaluation);
   parts.remove();

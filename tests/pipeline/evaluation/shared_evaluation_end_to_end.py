@@ -112,6 +112,14 @@ class SharedEvaluation(Case):
         self.assertEqual(first.wait(), 0, first.stderr())
         self.assert_as_alone()
 
+    def test_a_rank_that_wakes_when_all_is_over_does_no_harm(self):
+        first, second = self.start_ranks(2, {1: Fault("unit-", "rename", "stop")})
+        second.wait_for_fault()
+        self.assertEqual(first.wait(), 0, first.stderr())  # it holds the store, which is gone now
+        second.send(signal.SIGCONT)
+        self.assertEqual(second.wait(), 0, second.stderr())
+        self.assert_as_alone()
+
     def test_two_evaluations_into_one_folder_are_refused(self):
         with started(*self.words(self.config, self.out), fault=Fault("unit-", "rename", "stop")) as running:
             self.assertTrue(running.wait_for_stop())
