@@ -149,18 +149,18 @@ void hand_out(std::vector<SampleResult>&& results, std::vector<DatasetResult>& d
 
 }  // namespace
 
-Evaluation evaluate(const EvaluationConfig& given, const EvaluationOptions& options,
+Evaluation evaluate(const EvaluationConfig& config, const EvaluationOptions& options,
                     const std::function<void(const Evaluation&)>& write) {
   const auto start = std::chrono::steady_clock::now();
   run::RunOptions in_parts = options.run;
   in_parts.out = EvaluationParts::folder_in(options.run.out);
-  build::RankShare ranks(&given.network, in_parts, "evaluate");
-  EvaluationConfig config = given;
-  config.network = ranks.own(given.network);
+  build::RankShare ranks(&config.network, in_parts, "evaluate");
+  EvaluationConfig own = config;
+  own.network = ranks.own(config.network);
   const tbb::global_control threads(tbb::global_control::max_allowed_parallelism,
                                     build::flow_threads(ranks.options().threads));
   const Plan plan = plan_settings(options.settings);
-  Evaluation evaluation = described(config, options, plan);
+  Evaluation evaluation = described(own, options, plan);
   evaluation.rank = ranks.rank();
   if (!ranks.await_digests()) return evaluation;
   EvaluationParts parts(options.run.out, ranks.leads());
@@ -170,11 +170,11 @@ Evaluation evaluate(const EvaluationConfig& given, const EvaluationOptions& opti
   }
   if (ranks.leads()) parts.digests().save();
   ranks.tell_digests();
-  Machinery machinery(config);
+  Machinery machinery(own);
   evaluation.device = machinery.network->device_description();
   evaluation.device_warning = machinery.network->device_warning();
   const Instruments instruments{&plan, machinery.meshes.get(), machinery.network.get(), options.seed};
-  const std::string key = key_of_results(config, plan, evaluation);
+  const std::string key = key_of_results(own, plan, evaluation);
   if (!ranks.leads()) {
     evaluate_beside_leader(pool, instruments, machinery, parts.folder(), key, ranks);
     return evaluation;

@@ -86,7 +86,7 @@ unit::UnitFlow Evaluator::flow(run::Progress& progress) {
     work->predicted_before = load(*work->unit);
     return work;
   };
-  flow.decode = [this](unit::UnitWork& work) {
+  flow.decode = [](unit::UnitWork& work) {
     if (!work.predicted_before) decode(work);
   };
   flow.compute = [this](unit::UnitWork& work) {
@@ -187,6 +187,7 @@ std::size_t Evaluator::adapt(const TtaPass& pass, std::size_t setting, const Mea
   const std::vector<device::AdaptOutcome> outcomes = instruments_.network->adapt(requests, pass.iterates);
   const auto measure_all = [&](auto&& body_of) {
     std::vector<device::BodyPrediction> bodies;
+    bodies.reserve(outcomes.size());
     for (const device::AdaptOutcome& outcome : outcomes) bodies.push_back(body_of(outcome));
     measure_setting(setting++, bodies, unit);
   };

@@ -38,7 +38,7 @@ std::vector<fs::path> find_shards(const fs::path& source) {
 template <typename T, std::size_t N>
 std::array<T, N> read_row(const TableReader& table, const char* column, std::int64_t row) {
   const manifests::NumericColumn values = table.numeric(column, row, 1);
-  std::array<T, N> result;
+  std::array<T, N> result{};
   std::copy_n(values.template as<T>().begin(), N, result.begin());
   return result;
 }

@@ -103,6 +103,7 @@ int FailingIo::failures() const {
 
 }  // namespace q3d::testing
 
+// NOLINTBEGIN(readability-inconsistent-declaration-parameter-name): the C library's names are reserved.
 extern "C" {
 
 int open(const char* path, int flags, ...) {
@@ -134,3 +135,4 @@ int lstat(const char* path, struct stat* status) {
 }
 
 }  // extern "C"
+// NOLINTEND(readability-inconsistent-declaration-parameter-name)

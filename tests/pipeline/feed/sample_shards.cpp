@@ -58,6 +58,7 @@ manifests::ShardSample shard_sample(const std::string& id, unsigned seed, bool l
 void write_sample_shard(const std::filesystem::path& path, const std::string& name, int count,
                         unsigned seed) {
   std::vector<manifests::ShardSample> samples;
+  samples.reserve(static_cast<std::size_t>(count));
   for (int i = 0; i < count; ++i) {
     samples.push_back(
         shard_sample(name + "/" + std::to_string(i), seed + static_cast<unsigned>(i), i % 2 == 0));
