@@ -28,7 +28,7 @@ void ReopenedFile::read_at(std::uint64_t offset, std::span<std::byte> bytes) con
   }
 }
 
-// Of many threads that meet the forgotten file, one opens it again.
+// Opens the file again, unless another thread has done so since the caller got the forgotten one.
 void ReopenedFile::open_again(const std::shared_ptr<const FileDescriptor>& forgotten) const {
   const std::lock_guard lock(mutex_);
   if (file_ != forgotten) return;

@@ -68,10 +68,25 @@ std::span<const T> Table::column(const std::string& name) const {
   return found->second.as<T>();
 }
 
+template <typename T>
+std::span<const T> Table::column(const std::string& name, std::size_t per_row) const {
+  const std::span<const T> numbers = column<T>(name);
+  if (numbers.size() == static_cast<std::size_t>(rows) * per_row) return numbers;
+  throw std::runtime_error(
+      fmt::format("column {} holds {} numbers, expected {} rows of {}", name, numbers.size(), rows, per_row));
+}
+
+const std::vector<std::string>& Table::texts(const std::string& name) const {
+  const auto found = text.find(name);
+  if (found == text.end()) throw std::runtime_error(fmt::format("text column {} is missing", name));
+  return found->second;
+}
+
 #define Q3D_INSTANTIATE(T)                                                                        \
   template std::span<const T> NumericColumn::as<T>() const;                                       \
   template void Table::add<T>(const std::string&, std::vector<std::int64_t>, std::span<const T>); \
-  template std::span<const T> Table::column<T>(const std::string&) const;
+  template std::span<const T> Table::column<T>(const std::string&) const;                         \
+  template std::span<const T> Table::column<T>(const std::string&, std::size_t) const;
 Q3D_INSTANTIATE(float)
 Q3D_INSTANTIATE(double)
 Q3D_INSTANTIATE(std::int8_t)

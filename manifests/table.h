@@ -64,6 +64,11 @@ struct Table {
   // another type.
   template <typename T>
   std::span<const T> column(const std::string& name) const;
+  // The same for a column that must have `per_row` numbers in each row; another count throws too.
+  template <typename T>
+  std::span<const T> column(const std::string& name, std::size_t per_row) const;
+  // Returns the texts of a column. Throws std::runtime_error that names the column if it is absent.
+  const std::vector<std::string>& texts(const std::string& name) const;
 };
 
 // Writes the table under a temporary name, syncs it and renames it. Returns the file's SHA-256. The file is

@@ -93,13 +93,7 @@ void predict_with_ranks(const config::BuildConfig& config, Workspace& workspace,
     save_predictions(work, predictions);
     if (work.predicted_before) progress.advance(static_cast<std::int64_t>(work.unit->count), true);
   };
-  const auto count = [](const unit::UnitWork& work) {
-    return model::ranks::Tally{static_cast<std::int64_t>(work.unit->count)};
-  };
-  ranks.make(std::move(flow), workspace.device(), count,
-             [&progress, told = std::int64_t{0}](const model::ranks::Tally& others) mutable {
-               progress.advance(others[0] - std::exchange(told, others[0]));
-             });
+  ranks.make(std::move(flow), workspace.device(), progress);
   if (ranks.leads()) predictions.take_over_ranks();
 }
 
@@ -129,24 +123,17 @@ std::vector<Scored> score_pool(const config::BuildConfig& config, Workspace& wor
   return scored;
 }
 
-// Returns a digest of everything that must be the same in all ranks.
-std::string key_of_predictions(const config::BuildConfig& config, const Workspace& workspace) {
-  std::string text = stages::predict_key(config, workspace.assets(), workspace.device_key());
-  for (const candidates::Unit& unit : workspace.ingest().units) text += '\n' + unit.input_digest;
-  return manifests::sha256(text);
-}
-
 // Only rank 0 gets scores.
 std::vector<Scored> predict_pool(const config::BuildConfig& config, Workspace& workspace, RankShare& ranks) {
+  const std::string key = stages::predict_key(config, workspace.assets(), workspace.device_key());
   const auto open = [&] {
-    return std::make_unique<stages::StageStore>(
-        workspace.out(), "predict", stages::predict_key(config, workspace.assets(), workspace.device_key()),
-        &candidates::Unit::input_digest, ranks.of_store());
+    return std::make_unique<stages::StageStore>(workspace.out(), "predict", key,
+                                                &candidates::Unit::input_digest, ranks.of_store());
   };
   std::unique_ptr<stages::StageStore> predictions;
   if (ranks.leads()) predictions = open();  // takes over the results of an earlier run
   if (ranks.is_shared()) {
-    ranks.agree(key_of_predictions(config, workspace), false);
+    ranks.agree(key_of_work(key, workspace.ingest().units), false);
     if (!predictions) predictions = open();
     predict_with_ranks(config, workspace, *predictions, ranks);
     ranks.end();

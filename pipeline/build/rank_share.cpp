@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "manifests/atomic_file.h"
+#include "manifests/digest.h"
 #include "pipeline/network/torch_network.h"
 #include "pipeline/run/errors.h"
 #include "pipeline/run/interrupt.h"
@@ -261,6 +262,16 @@ void RankShare::make(unit::UnitFlow flow, device::DeviceWorker& device, const Co
   }
 }
 
+void RankShare::make(unit::UnitFlow flow, device::DeviceWorker& device, run::Progress& progress) {
+  const auto count = [](const unit::UnitWork& work) {
+    return model::ranks::Tally{static_cast<std::int64_t>(work.unit->count)};
+  };
+  make(std::move(flow), device, count,
+       [&progress, told = std::int64_t{0}](const model::ranks::Tally& others) mutable {
+         progress.advance(others[0] - std::exchange(told, others[0]));
+       });
+}
+
 // Keeps the store open for ranks that are about to join or to leave.
 void RankShare::say_farewell() {
   const auto deadline = std::chrono::steady_clock::now() + kFarewell;
@@ -279,6 +290,12 @@ void RankShare::end() {
     is_store_lost_ = true;
   }
   if (has_shared_units_) remove_leftovers(options_.out);
+}
+
+std::string key_of_work(const std::string& stage_key, const std::vector<candidates::Unit>& units) {
+  std::string text = stage_key;
+  for (const candidates::Unit& unit : units) text += '\n' + unit.input_digest;
+  return manifests::sha256(text);
 }
 
 }  // namespace q3d::pipeline::build

@@ -13,12 +13,14 @@
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "model/ranks/rank_place.h"
 #include "model/ranks/shared_store.h"
 #include "model/ranks/unit_claims.h"
 #include "pipeline/config/build_config.h"
 #include "pipeline/device/device_worker.h"
+#include "pipeline/run/progress.h"
 #include "pipeline/run/run_options.h"
 #include "pipeline/stages/stage_store.h"
 #include "pipeline/unit/unit_flow.h"
@@ -70,6 +72,10 @@ class RankShare {
   // Throws LeaderLost, Interrupted, and what the flow throws.
   void make(unit::UnitFlow flow, device::DeviceWorker& device, const Count& count, TellOthers tell_others);
 
+  // The same for a flow whose `write` advances `progress` by the candidates of its own units; those of the
+  // other ranks are added.
+  void make(unit::UnitFlow flow, device::DeviceWorker& device, run::Progress& progress);
+
   // Tells the other ranks that no work is left, and removes the temporary files of killed ranks. Called by
   // rank 0.
   void end();
@@ -95,5 +101,8 @@ class RankShare {
   TellOthers tell_others_;  // guarded by mutex_
   std::jthread life_;       // the last member: it uses the others
 };
+
+// Returns a digest of the key of a stage and its units' inputs, for RankShare::agree().
+std::string key_of_work(const std::string& stage_key, const std::vector<candidates::Unit>& units);
 
 }  // namespace q3d::pipeline::build

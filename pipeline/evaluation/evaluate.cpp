@@ -88,13 +88,7 @@ struct Machinery {
 void evaluate_with_ranks(Evaluator& evaluator, Machinery& machinery, stages::StageStore& store,
                          std::int64_t samples, build::RankShare& ranks) {
   run::Progress progress("evaluated", samples, ranks.options().quiet);
-  const auto count = [](const unit::UnitWork& work) {
-    return model::ranks::Tally{static_cast<std::int64_t>(work.unit->count)};
-  };
-  ranks.make(evaluator.flow(progress), machinery.device, count,
-             [&progress, told = std::int64_t{0}](const model::ranks::Tally& others) mutable {
-               progress.advance(others[0] - std::exchange(told, others[0]));
-             });
+  ranks.make(evaluator.flow(progress), machinery.device, progress);
   if (ranks.leads()) store.take_over_ranks();
 }
 
@@ -110,9 +104,7 @@ std::vector<SampleResult> evaluate_pool(const Pool& pool, const Instruments& ins
   if (ranks.leads()) store = open();  // takes over the results of an earlier run
   const auto samples = static_cast<std::int64_t>(pool.candidates.size());
   if (ranks.is_shared()) {
-    std::string text = key;
-    for (const candidates::Unit& unit : pool.units) text += '\n' + unit.input_digest;
-    ranks.agree(manifests::sha256(text), false);
+    ranks.agree(build::key_of_work(key, pool.units), false);
     if (!store) store = open();
     Evaluator evaluator(pool, instruments, *store);
     evaluate_with_ranks(evaluator, machinery, *store, samples, ranks);
@@ -149,8 +141,8 @@ void hand_out(std::vector<SampleResult>&& results, std::vector<DatasetResult>& d
 
 }  // namespace
 
-Evaluation evaluate(const EvaluationConfig& config, const EvaluationOptions& options,
-                    const std::function<void(const Evaluation&)>& write) {
+void evaluate(const EvaluationConfig& config, const EvaluationOptions& options,
+              const std::function<void(const Evaluation&)>& write) {
   const auto start = std::chrono::steady_clock::now();
   run::RunOptions in_parts = options.run;
   in_parts.out = EvaluationParts::folder_in(options.run.out);
@@ -161,8 +153,7 @@ Evaluation evaluate(const EvaluationConfig& config, const EvaluationOptions& opt
                                     build::flow_threads(ranks.options().threads));
   const Plan plan = plan_settings(options.settings);
   Evaluation evaluation = described(own, options, plan);
-  evaluation.rank = ranks.rank();
-  if (!ranks.await_digests()) return evaluation;
+  if (!ranks.await_digests()) return;
   EvaluationParts parts(options.run.out, ranks.leads());
   Pool pool;
   for (const EvaluatedDataset& dataset : config.datasets) {
@@ -177,13 +168,12 @@ Evaluation evaluate(const EvaluationConfig& config, const EvaluationOptions& opt
   const std::string key = key_of_results(own, plan, evaluation);
   if (!ranks.leads()) {
     evaluate_beside_leader(pool, instruments, machinery, parts.folder(), key, ranks);
-    return evaluation;
+    return;
   }
   hand_out(evaluate_pool(pool, instruments, machinery, parts.folder(), key, ranks), evaluation.datasets);
   evaluation.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   write(evaluation);
   parts.remove();
-  return evaluation;
 }
 
 }  // namespace q3d::pipeline::evaluation

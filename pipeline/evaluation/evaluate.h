@@ -59,15 +59,14 @@ struct Evaluation {
   std::vector<Setting> settings;
   std::vector<DatasetResult> datasets;
   double seconds = 0.0;
-  int rank = 0;  // the results are complete in rank 0 alone
 };
 
-// Predicts and, if requested, adapts every sample in batches, and calls `write` in rank 0 to write the
-// results. A bad sample gives a result with a reason. Until the results are written, finished units lie in
-// <out>/.parts; the same evaluation goes on from there if it was stopped. Ranks share the units if
-// options.run.shares_units is set. Throws ConfigError, std::runtime_error, Interrupted, and what `write`
-// throws.
-Evaluation evaluate(const EvaluationConfig& config, const EvaluationOptions& options,
-                    const std::function<void(const Evaluation&)>& write);
+// Predicts and, if requested, adapts every sample in batches, and calls `write` in rank 0, alone of all
+// ranks, to write the results. A bad sample gives a result with a reason. Until the results are written,
+// finished units lie in <out>/.parts; the same evaluation goes on from there if it was stopped. Ranks share
+// the units if options.run.shares_units is set. Throws ConfigError, std::runtime_error, Interrupted, and what
+// `write` throws.
+void evaluate(const EvaluationConfig& config, const EvaluationOptions& options,
+              const std::function<void(const Evaluation&)>& write);
 
 }  // namespace q3d::pipeline::evaluation

@@ -1,4 +1,5 @@
-// What a running evaluation keeps on disk, so that it can go on after it was stopped, and ranks can share it.
+// A running evaluation keeps its finished units on disk, so that it can go on after it was stopped, and ranks
+// can share it.
 #pragma once
 
 #include <filesystem>

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <stdexcept>
 #include <string>
@@ -13,24 +14,27 @@ namespace {
 
 using manifests::Table;
 
-template <typename T>
-std::span<const T> numbers_of(const Table& table, const char* name, std::size_t per_row) {
-  const std::span<const T> numbers = table.column<T>(name);
-  if (numbers.size() == static_cast<std::size_t>(table.rows) * per_row) return numbers;
-  throw std::runtime_error(fmt::format("column {}: got {} numbers, expected {} rows of {}", name,
-                                       numbers.size(), table.rows, per_row));
+// Ids and details may hold any character, also NUL, which a column of text cannot.
+std::vector<std::byte> bytes_of(const std::string& text) {
+  const auto bytes = std::as_bytes(std::span(text));
+  return {bytes.begin(), bytes.end()};
 }
 
-const std::vector<std::string>& texts_of(const Table& table, const char* name) {
-  const auto found = table.text.find(name);
-  if (found != table.text.end()) return found->second;
-  throw std::runtime_error(fmt::format("there is no column {}", name));
+std::string text_of(const std::vector<std::byte>& bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-void require_same_samples(const std::vector<std::string>& ids, std::span<const SampleResult> results) {
-  const bool are_same =
-      std::equal(ids.begin(), ids.end(), results.begin(), results.end(),
-                 [](const std::string& id, const SampleResult& result) { return id == result.id; });
+const std::vector<std::vector<std::byte>>& blobs_of(const Table& table, const char* name) {
+  const auto found = table.blobs.find(name);
+  if (found != table.blobs.end()) return found->second;
+  throw std::runtime_error(fmt::format("blob column {} is missing", name));
+}
+
+void require_same_samples(const Table& table, std::span<const SampleResult> results) {
+  const auto& ids = blobs_of(table, "id");
+  const bool are_same = std::equal(
+      ids.begin(), ids.end(), results.begin(), results.end(),
+      [](const std::vector<std::byte>& id, const SampleResult& result) { return text_of(id) == result.id; });
   if (!are_same) throw std::runtime_error("the rows are those of other samples");
 }
 
@@ -45,9 +49,9 @@ Table to_table(std::span<const SampleResult> results, std::size_t settings) {
   std::vector<float> betas(results.size() * settings * smal::kNumBetas);
   for (std::size_t i = 0; i < results.size(); ++i) {
     const SampleResult& result = results[i];
-    table.text["id"].push_back(result.id);
+    table.blobs["id"].push_back(bytes_of(result.id));
     table.text["failure"].emplace_back(manifests::to_string(result.failure));
-    table.text["detail"].push_back(result.detail);
+    table.blobs["detail"].push_back(bytes_of(result.detail));
     by_mask.push_back(result.normalised_by_mask ? 1 : 0);
     for (std::size_t s = 0; s < result.values.size(); ++s) {
       const std::size_t row = i * settings + s;
@@ -69,17 +73,17 @@ Table to_table(std::span<const SampleResult> results, std::size_t settings) {
 }
 
 void set_measured(const Table& table, std::size_t settings, std::span<SampleResult> results) {
-  require_same_samples(texts_of(table, "id"), results);
-  const std::vector<std::string>& failures = texts_of(table, "failure");
-  const std::vector<std::string>& details = texts_of(table, "detail");
-  const auto by_mask = numbers_of<std::uint8_t>(table, "normalised_by_mask", 1);
-  const auto is_measured = numbers_of<std::uint8_t>(table, "is_measured", settings * kMetricCount);
-  const auto values = numbers_of<double>(table, "values", settings * kMetricCount);
-  const auto betas = numbers_of<float>(table, "betas", settings * smal::kNumBetas);
+  require_same_samples(table, results);
+  const std::vector<std::string>& failures = table.texts("failure");
+  const auto& details = blobs_of(table, "detail");
+  const auto by_mask = table.column<std::uint8_t>("normalised_by_mask", 1);
+  const auto is_measured = table.column<std::uint8_t>("is_measured", settings * kMetricCount);
+  const auto values = table.column<double>("values", settings * kMetricCount);
+  const auto betas = table.column<float>("betas", settings * smal::kNumBetas);
   for (std::size_t i = 0; i < results.size(); ++i) {
     SampleResult& result = results[i];
     result.failure = manifests::reason_from_string(failures[i]);
-    result.detail = details[i];
+    result.detail = text_of(details[i]);
     result.normalised_by_mask = by_mask[i] != 0;
     if (result.failure != manifests::Reason::none) continue;
     result.values.resize(settings);

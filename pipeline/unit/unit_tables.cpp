@@ -26,21 +26,10 @@ void add_field(Table& table, const std::string& name, const std::vector<Row>& ro
   table.add<float>(name, std::move(row_shape), values);
 }
 
-// Returns the numbers of a column with a given count in every row. Throws std::runtime_error if the column
-// differs.
-template <typename T>
-std::span<const T> numbers_of(const Table& table, const std::string& name, std::size_t per_row) {
-  const std::span<const T> numbers = table.column<T>(name);
-  const auto rows = static_cast<std::size_t>(table.rows);
-  if (numbers.size() == rows * per_row) return numbers;
-  throw std::runtime_error(
-      fmt::format("column {} holds {} numbers, expected {} rows of {}", name, numbers.size(), rows, per_row));
-}
-
 template <typename Row, typename Part, typename Value>
 void read_field(const Table& table, const std::string& name, std::vector<Row>& rows, Value Part::*field) {
   smal::NumbersOf<Value> numbers;
-  const std::span<const float> values = numbers_of<float>(table, name, numbers.size());
+  const std::span<const float> values = table.column<float>(name, numbers.size());
   for (std::size_t i = 0; i < rows.size(); ++i) {
     std::copy_n(values.begin() + static_cast<std::ptrdiff_t>(i * numbers.size()), numbers.size(),
                 numbers.begin());
@@ -111,12 +100,6 @@ std::span<const manifests::TrustColumn> measured_columns() {
   return std::span(manifests::kTrustColumns).subspan(1);
 }
 
-const std::vector<std::string>& text_column(const Table& table, const std::string& name) {
-  const auto found = table.text.find(name);
-  if (found == table.text.end()) throw std::runtime_error("text column " + name + " is missing");
-  return found->second;
-}
-
 // Reads a reason. reason_from_string() throws std::invalid_argument, which would mean a wrong config.
 manifests::Reason reason_in(const std::string& column, const std::string& name) {
   try {
@@ -185,10 +168,10 @@ Table to_table(std::span<const candidates::Candidate> candidates,
 std::vector<PredictedSample> predicted_from_table(const Table& table) {
   std::vector<PredictedSample> samples(static_cast<std::size_t>(table.rows));
   if (samples.empty()) return samples;
-  const auto image_size = numbers_of<std::int32_t>(table, "image_size_px", 2);
-  const auto has_mask = numbers_of<std::uint8_t>(table, "has_mask", 1);
-  const auto& failure = text_column(table, "failure");
-  const auto& detail = text_column(table, "detail");
+  const auto image_size = table.column<std::int32_t>("image_size_px", 2);
+  const auto has_mask = table.column<std::uint8_t>("has_mask", 1);
+  const auto& failure = table.texts("failure");
+  const auto& detail = table.texts("detail");
   for (std::size_t i = 0; i < samples.size(); ++i) {
     samples[i].failure = reason_in("failure", failure[i]);
     samples[i].detail = detail[i];
@@ -202,13 +185,13 @@ std::vector<PredictedSample> predicted_from_table(const Table& table) {
 
 manifests::SampleRecord candidate_from_table(const Table& table, std::size_t row) {
   manifests::SampleRecord record;
-  record.id = text_column(table, "id").at(row);
-  record.image_ref = text_column(table, "image_ref").at(row);
-  const auto box = numbers_of<double>(table, "box_xywh_px", 4).subspan(4 * row, 4);
+  record.id = table.texts("id").at(row);
+  record.image_ref = table.texts("image_ref").at(row);
+  const auto box = table.column<double>("box_xywh_px", 4).subspan(4 * row, 4);
   record.box = {box[0], box[1], box[2], box[3]};
-  const auto positions = numbers_of<double>(table, "keypoints_px", 2 * record.keypoints.size());
-  const auto v = numbers_of<float>(table, "keypoint_v", record.keypoints.size());
-  const auto weights = numbers_of<float>(table, "keypoint_weight", record.keypoints.size());
+  const auto positions = table.column<double>("keypoints_px", 2 * record.keypoints.size());
+  const auto v = table.column<float>("keypoint_v", record.keypoints.size());
+  const auto weights = table.column<float>("keypoint_weight", record.keypoints.size());
   for (std::size_t k = 0; k < record.keypoints.size(); ++k) {
     const std::size_t at = row * record.keypoints.size() + k;
     record.keypoints[k] = {positions[2 * at], positions[2 * at + 1], v[at], weights[at]};
@@ -236,7 +219,7 @@ Table to_table(const std::vector<RefinedSample>& samples) {
 std::vector<RefinedSample> refined_from_table(const Table& table) {
   std::vector<RefinedSample> samples(static_cast<std::size_t>(table.rows));
   if (samples.empty()) return samples;
-  const auto positions = numbers_of<std::int64_t>(table, "sample", 1);
+  const auto positions = table.column<std::int64_t>("sample", 1);
   for (std::size_t i = 0; i < samples.size(); ++i) {
     samples[i].sample = static_cast<std::size_t>(positions[i]);
   }
@@ -265,10 +248,10 @@ Table to_table(const std::vector<MeasuredLabel>& labels) {
 
 std::vector<MeasuredLabel> measured_from_table(const Table& table) {
   std::vector<MeasuredLabel> labels(static_cast<std::size_t>(table.rows));
-  const auto positions = numbers_of<std::int64_t>(table, "sample", 1);
+  const auto positions = table.column<std::int64_t>("sample", 1);
   for (std::size_t i = 0; i < labels.size(); ++i) labels[i].sample = static_cast<std::size_t>(positions[i]);
   for (const manifests::TrustColumn& column : measured_columns()) {
-    const auto values = numbers_of<double>(table, column.name, 1);
+    const auto values = table.column<double>(column.name, 1);
     for (std::size_t i = 0; i < labels.size(); ++i) labels[i].scores.*column.score = values[i];
   }
   return labels;
@@ -297,9 +280,9 @@ Table to_table(const std::vector<EncodedCrop>& crops) {
 
 std::vector<EncodedCrop> crops_from_table(Table table) {
   std::vector<EncodedCrop> crops(static_cast<std::size_t>(table.rows));
-  const auto positions = numbers_of<std::int64_t>(table, "sample", 1);
-  const auto sides = numbers_of<std::int32_t>(table, "side_px", 1);
-  const auto affines = numbers_of<double>(table, "from_image", 6);
+  const auto positions = table.column<std::int64_t>("sample", 1);
+  const auto sides = table.column<std::int32_t>("side_px", 1);
+  const auto affines = table.column<double>("from_image", 6);
   auto& pictures = blob_column(table, "picture");
   auto& masks = blob_column(table, "mask");
   for (std::size_t i = 0; i < crops.size(); ++i) {
