@@ -21,7 +21,7 @@ train() {
   if [ "${RANKS:-2}" = 1 ]; then
     "$program" train "$@" --threads 1
   else
-    OMP_NUM_THREADS=1 .venv/bin/torchrun --standalone --no-python --nproc-per-node "${RANKS:-2}" "$program" train "$@"
+    "$program" train "$@" --ranks "${RANKS:-2}"
   fi
 }
 

@@ -1,5 +1,6 @@
 #include "model/ranks/rank_place.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <sched.h>
 #include <unistd.h>
@@ -53,6 +54,13 @@ int ranks_of_machine(const char* name, int most) {
   return number(name, first.c_str(), 1, most);
 }
 
+// Returns the descriptor that the launcher has left open, which is not for the programs that this one starts.
+int own_descriptor(const char* name) {
+  const int descriptor = optional(name, 0, std::numeric_limits<int>::max(), -1);
+  if (descriptor >= 0) ::fcntl(descriptor, F_SETFD, FD_CLOEXEC);
+  return descriptor;
+}
+
 RankPlace place(const Names& names) {
   constexpr int kMost = std::numeric_limits<int>::max();
   RankPlace place;
@@ -71,6 +79,10 @@ RankPlace place(const Names& names) {
   const char* agent = std::getenv("TORCHELASTIC_USE_AGENT_STORE");
   place.launcher_has_store = agent != nullptr && std::strcmp(agent, "True") == 0;
   place.attempt = optional("TORCHELASTIC_RESTART_COUNT", 0, kMost, 0);
+  if (place.rank == 0) {
+    place.store_socket = own_descriptor("Q3D_STORE_SOCKET");
+    place.ready_pipe = own_descriptor("Q3D_READY_PIPE");
+  }
   return place;
 }
 
@@ -87,6 +99,14 @@ RankPlace rank_place_from_environment() {
   // Only srun numbers a step; sbatch and salloc, which start one process, set the other variables too.
   if (std::getenv("SLURM_STEP_ID") != nullptr && std::getenv(kSlurm.size) != nullptr) return place(kSlurm);
   return {};
+}
+
+void tell_launcher(const RankPlace& place) {
+  if (place.ready_pipe < 0) return;
+  const char word = 1;
+  const ssize_t written = ::write(place.ready_pipe, &word, 1);  // a launcher that has ended need not know
+  static_cast<void>(written);
+  ::close(place.ready_pipe);
 }
 
 int own_cores(const RankPlace& place) {

@@ -27,6 +27,7 @@ inline c10::intrusive_ptr<c10d::Store> open_tcp_store(const RankPlace& place, co
   options.numWorkers = static_cast<std::size_t>(place.size);
   options.waitWorkers = gathering == Gathering::together;
   options.timeout = place.join_timeout;
+  if (place.store_socket >= 0) options.masterListenFd = place.store_socket;
   // Torchrun keeps keys of its own in the store, and keeps the store when it starts the ranks again.
   return c10::make_intrusive<c10d::PrefixStore>(
       fmt::format("quadruped3d/{}/{}", purpose, place.attempt),

@@ -13,6 +13,7 @@
 
 #include "manifests/atomic_file.h"
 #include "manifests/digest.h"
+#include "pipeline/config/device_names.h"
 #include "pipeline/network/torch_network.h"
 #include "pipeline/run/errors.h"
 #include "pipeline/run/interrupt.h"
@@ -79,8 +80,10 @@ std::string new_run() {
 RankShare::RankShare(const config::NetworkConfig* network, const run::RunOptions& options,
                      const std::string& purpose)
     : place_(find_place(options.shares_units)), options_(options) {
+  if (network != nullptr) config::require_device_for_each_rank(network->device, place_.local_size);
   if (!is_shared()) return;
   if (network != nullptr) require_stated_threads(*network);
+  model::ranks::tell_launcher(place_);
   if (options_.threads == 0) options_.threads = model::ranks::own_cores(place_);
   if (!leads()) options_.quiet = true;
   if (leads()) run_ = new_run();

@@ -109,6 +109,7 @@ Command add_build(CLI::App& app) {
       ->add_option("--corrections", arguments->corrections,
                    "file of corrected keypoints, as `quadruped3d corrections` writes it")
       ->check(CLI::ExistingFile);
+  ranks_option(*command);
   threads_option(*command, arguments->run.threads);
   partial_options(*command, *arguments);
   above_ceiling_flag(*command, arguments->run.above_ceiling);
@@ -123,11 +124,13 @@ Command add_build(CLI::App& app) {
       "  quadruped3d build -c my.json -c out/thresholds.json -o out --dry-run\n"
       "  quadruped3d build -c my.json -c out/thresholds.json -o out --until predict\n"
       "  quadruped3d build -c configs/world_pools/animal3d.json -o out/pools/animal3d\n"
-      "  torchrun --no-python --nproc-per-node 4 quadruped3d build -c my.json -c out/thresholds.json -o out\n"
+      "  quadruped3d build -c my.json -c out/thresholds.json -o out --ranks 4    on four GPUs of this "
+      "machine\n"
       "If a build was stopped or killed, run the same command again: it continues where it left off and\n"
-      "ends with the same bytes. The ranks that torchrun or srun starts share the units, each with a GPU or\n"
-      "a part of the cores, and publish the same bytes as one process (docs/scale.md). Bad pictures and\n"
-      "records never stop a build; they are counted and listed with their reasons in verdicts.csv.\n"
+      "ends with the same bytes. Ranks, which --ranks, torchrun or srun starts, share the units, each with "
+      "a\n"
+      "GPU or a part of the cores, and publish the same bytes as one process (docs/scale.md). Bad pictures\n"
+      "and records never stop a build; they are counted and listed with their reasons in verdicts.csv.\n"
       "Pseudo labels need thresholds in the config; `quadruped3d calibrate` finds them. Datasets of the\n"
       "role \"truth\" or \"2d_only\" bring their own labels and need neither thresholds nor a network\n"
       "(docs/config.md).");

@@ -108,6 +108,7 @@ Command add_calibrate(CLI::App& app) {
                       "write the thresholds to this file, which build takes as a second --config");
   command->add_option("-f,--figure", arguments->figure,
                       "write an SVG figure of yield and AUC against the threshold");
+  ranks_option(*command);
   threads_option(*command, arguments->run.threads);
   above_ceiling_flag(*command, arguments->run.above_ceiling);
   json_flag(*command, arguments->json);

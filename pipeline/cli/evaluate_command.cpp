@@ -119,6 +119,7 @@ Command add_evaluate(CLI::App& app) {
       "--paper-tables", arguments->paper_tables,
       "also print the paper's tables with the paper's numbers, and write them to OUT/paper_tables.md");
   command->add_flag("--species", arguments->species, "also show the table by species");
+  ranks_option(*command);
   threads_option(*command, arguments->options.run.threads);
   json_flag(*command, arguments->json, "print evaluation.json to stdout");
   quiet_flag(*command, arguments->options.run.quiet);
@@ -129,9 +130,8 @@ Command add_evaluate(CLI::App& app) {
       "  quadruped3d evaluate -c my.json -o out/eval --limit 50                      a quick look\n"
       "  quadruped3d evaluate -c my.json -o out/eval --tta 30 --visible 0.7,0.5,0.3  with adaptation\n"
       "  quadruped3d evaluate -c my.json -o out/eval --tta-curve 0,5,10,20,30,50,70  does it overfit?\n"
-      "An evaluation that was stopped goes on with the same command. Ranks that torchrun or srun starts "
-      "share\n"
-      "it (docs/scale.md). docs/evaluation.md defines every number.");
+      "An evaluation that was stopped goes on with the same command. Ranks, which --ranks, torchrun or srun\n"
+      "starts, share it (docs/scale.md). docs/evaluation.md defines every number.");
   return [arguments] { return run(*arguments); };
 }
 

@@ -4,6 +4,7 @@
 #include <span>
 #include <string_view>
 
+#include "pipeline/cli/local_ranks.h"
 #include "pipeline/cli/network_program.h"
 #include "pipeline/cli/plain_commands.h"
 #include "pipeline/cli/program.h"
@@ -14,7 +15,8 @@ int main(int argc, char** argv) {
   const std::size_t command = argc > 2 && std::string_view(argv[1]) == "help" ? 2 : 1;
   const auto words = std::span(argv, static_cast<std::size_t>(argc));
   if (words.size() > command && cli::needs_network(words.subspan(command))) {
-    return cli::become_network_program(argv);
+    const int ranks = cli::wanted_ranks(words.subspan(command));
+    return ranks > 1 ? cli::run_ranks(argv, ranks) : cli::become_network_program(argv);
   }
   return cli::run_program(argc, argv, cli::kPlainCommands);
 }

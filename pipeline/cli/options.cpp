@@ -2,6 +2,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include <cstdlib>
+
 #include "manifests/durability.h"
 
 namespace q3d::pipeline::cli {
@@ -35,7 +37,7 @@ CLI::Option* device_option(CLI::App& command, ConfigArguments& config) {
   return command
       .add_option("--device", config.device,
                   "where the network runs, instead of the config's network.device: auto, cpu, cuda "
-                  "or cuda:1")
+                  "or cuda:1; several GPUs, such as cuda:0,cuda:1, where --ranks is an option too")
       ->type_name("DEVICE");
 }
 
@@ -61,6 +63,20 @@ CLI::Option* out_file_option(CLI::App& command, std::filesystem::path& out, cons
 
 CLI::Option* threads_option(CLI::App& command, int& threads, const std::string& text) {
   return command.add_option("-t,--threads", threads, text)->check(CLI::NonNegativeNumber);
+}
+
+CLI::Option* ranks_option(CLI::App& command) {
+  const auto require_launcher = [](int ranks) {
+    if (ranks == 1 || std::getenv("WORLD_SIZE") != nullptr) return;
+    throw CLI::ValidationError("--ranks", "only the program quadruped3d starts ranks");
+  };
+  return command
+      .add_option_function<int>(
+          "--ranks", require_launcher,
+          "number of processes on this machine that share the work, each with a GPU or cores of its own "
+          "(docs/scale.md)")
+      ->type_name("N")
+      ->check(CLI::Range(1, kMostRanks));
 }
 
 CLI::Option* json_flag(CLI::App& command, bool& json, const std::string& text) {

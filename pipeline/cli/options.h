@@ -40,6 +40,9 @@ CLI::Option* out_file_option(CLI::App& command, std::filesystem::path& out, cons
 CLI::Option* threads_option(
     CLI::App& command, int& threads,
     const std::string& text = "number of threads that read and decode pictures (0 = all cores)");
+inline constexpr int kMostRanks = 1024;  // of one machine
+// --ranks, which `quadruped3d` reads itself before it starts a command (local_ranks.h).
+CLI::Option* ranks_option(CLI::App& command);
 // --json
 CLI::Option* json_flag(CLI::App& command, bool& json,
                        const std::string& text = "print a machine-readable summary to stdout");

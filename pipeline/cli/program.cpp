@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
+#include <cstdlib>
 #include <new>
 #include <stdexcept>
 #include <string>
@@ -70,6 +71,12 @@ std::vector<std::pair<std::string, Command>> add_commands(CLI::App& app,
   return commands;
 }
 
+// Returns false for a rank that --ranks or torchrun has started, except for rank 0, which speaks for all.
+bool speaks_for_all() {
+  const char* rank = std::getenv("RANK");
+  return rank == nullptr || std::getenv("WORLD_SIZE") == nullptr || std::string_view(rank) == "0";
+}
+
 int parse_and_run(std::vector<std::string> words, std::span<const CommandEntry> entries) {
   CLI::App app{
       "Builds 3D datasets of quadrupeds: it adds pseudo-3D labels (SMAL pose, shape, camera) to photographs\n"
@@ -115,7 +122,8 @@ CLI::App* declare(CLI::App& app, std::string_view name) {
 int run_program(int argc, char** argv, std::span<const CommandEntry> entries) {
   prepare_standard_streams();
   cv::setNumThreads(1);  // the flow graph's threads are the only ones
-  run::install_interrupt_handlers();
+  const bool speaks = speaks_for_all();
+  run::install_interrupt_handlers(/*quiet=*/!speaks);
   const std::vector<std::string> words = with_help_expanded({argv, argv + argc});
   if (const auto problem = unknown_command(words)) {
     fmt::print(stderr, "{}", *problem);
@@ -128,7 +136,7 @@ int run_program(int argc, char** argv, std::span<const CommandEntry> entries) {
     finish_stdout();
     return code;
   } catch (const run::Interrupted&) {
-    fmt::print(stderr, "stopped; run the same command to continue\n");
+    if (speaks) fmt::print(stderr, "stopped; run the same command to continue\n");
     return run::interrupt_exit_code();
   } catch (const run::ConfigError& error) {
     fmt::print(stderr, "quadruped3d: {}\n", error.what());

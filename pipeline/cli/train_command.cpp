@@ -49,6 +49,7 @@ Command add_train(CLI::App& app) {
   command->add_option("-s,--stage", arguments->stage, "name of the stage in the config, such as 1 or 3")
       ->required();
   out_option(*command, arguments->options.out, "folder of this run, for state, log and weights")->required();
+  ranks_option(*command);
   threads_option(*command, arguments->options.threads,
                  "number of threads that prepare batches (0 = all cores)");
   command
@@ -64,7 +65,7 @@ Command add_train(CLI::App& app) {
       "  quadruped3d train --config configs/world_training.json --stage 1 --out out/stage1\n"
       "  quadruped3d train -c my.json --stage 3 -o out/stage3 --max-steps 1000\n"
       "  quadruped3d train -c my.json --stage 3 -o out/trial --set batch=8 --set seed=2\n"
-      "  torchrun --no-python --nproc-per-node 4 quadruped3d train -c my.json --stage 1 -o out/stage1\n"
+      "  quadruped3d train -c my.json --stage 1 -o out/stage1 --ranks 4    on four GPUs of this machine\n"
       "If a run was stopped, run the same command again: it continues from the newest state and ends with\n"
       "the same weights as a run that was never stopped. Training needs pose and shape priors; `quadruped3d\n"
       "init --priors FILE` writes those of the synthetic quadruped. docs/training.md describes the config, "

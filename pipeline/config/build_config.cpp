@@ -266,7 +266,7 @@ BuildConfig parse_build_config(const json& merged, const std::string& where, Net
   require(!config.datasets.empty(), where, "\"datasets\" must name at least one dataset");
   if (network != nullptr) {
     parse_object(*network, where + ": network", network_settings(), config.network);
-    require_one_device(config.network.device, where + ": network: device");
+    parse_devices(config.network.device, where + ": network: device");
   } else {
     require(!needs_network(config) || network_key == NetworkKey::optional, where,
             "the key \"network\" is missing; a dataset of role \"pseudo\", the default, gets its labels from "

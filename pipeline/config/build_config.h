@@ -40,13 +40,12 @@ struct DatasetConfig : loaders::formats::DatasetOptions {
 struct NetworkConfig {
   std::filesystem::path checkpoint;  // safetensors, official parameter names
   std::filesystem::path smal_asset;  // safetensors; see smal/tensors/asset.h
-  std::string device = "auto";       // auto, cpu, cuda, cuda:I
+  std::string device = "auto";       // auto, cpu, cuda, cuda:I, or a GPU for each rank: cuda:I,cuda:J
   Dtype dtype = Dtype::float32;
   int batch = 8;  // crops in one forward pass; batches never cross a unit
   int compute_threads =
-      0;  // threads of one CPU operator; 0 = as the network's size suggests. Part of the key.
-  int local_rank =
-      0;  // of processes that share a machine; no key of the config. It chooses the GPU of "auto" and "cuda".
+      0;               // threads of one CPU operator; 0 = as the network's size suggests. Part of the key.
+  int local_rank = 0;  // of processes that share a machine; no key of the config. It chooses the GPU.
 };
 
 struct TtaConfig {

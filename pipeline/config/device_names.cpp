@@ -6,9 +6,12 @@
 #include <charconv>
 
 #include "pipeline/run/errors.h"
+#include "pipeline/run/words.h"
 
 namespace q3d::pipeline::config {
 namespace {
+
+constexpr const char* kKey = "network.device";
 
 bool is_numbered_gpu(std::string_view name) {
   constexpr std::string_view kPrefix = "cuda:";
@@ -48,13 +51,17 @@ std::vector<std::string> parse_devices(const std::string& text, const std::strin
   return devices;
 }
 
-void require_one_device(const std::string& text, const std::string& where) {
-  const std::size_t count = parse_devices(text, where).size();
-  if (count == 1) return;
+void require_device_for_each_rank(const std::string& text, int ranks) {
+  const std::size_t count = parse_devices(text, kKey).size();
+  if (count == 1 || count == static_cast<std::size_t>(ranks)) return;
   throw run::ConfigError(
-      fmt::format("{}: got {} devices (\"{}\"), and one process uses one device so far. Name one of them. "
-                  "Training can use several by a process each, with torchrun (docs/training.md)",
-                  where, count, text));
+      fmt::format("{}: got {} GPUs (\"{}\") for {}, expected one for each. Add --ranks {}, or name one GPU",
+                  kKey, count, text, run::counted(ranks, "process", "processes"), count));
+}
+
+std::string device_of_rank(const std::string& text, int local_rank) {
+  const std::vector<std::string> devices = parse_devices(text, kKey);
+  return devices[static_cast<std::size_t>(local_rank) % devices.size()];
 }
 
 }  // namespace q3d::pipeline::config

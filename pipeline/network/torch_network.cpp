@@ -14,6 +14,7 @@
 #include "model/prima.h"
 #include "model/priors.h"
 #include "model/tta.h"
+#include "pipeline/config/device_names.h"
 #include "pipeline/run/errors.h"
 #include "smal/numbers.h"
 #include "smal/tensors/safetensors.h"
@@ -77,7 +78,8 @@ torch::Tensor stack_patches(std::span<const device::PatchView> patches) {
 model::DeviceChoice choose_device(const config::NetworkConfig& network, int threads) {
   model::configure_compute(threads);
   try {
-    return model::choose_device(network.device, network.local_rank);
+    return model::choose_device(config::device_of_rank(network.device, network.local_rank),
+                                network.local_rank);
   } catch (const std::invalid_argument& error) {
     throw run::ConfigError(error.what());
   }

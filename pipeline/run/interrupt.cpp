@@ -13,6 +13,7 @@ namespace {
 constexpr unsigned kGraceSeconds = 8;
 constexpr int kSignalled = 128;  // a shell's exit code for a process that a signal ended, less the signal
 volatile std::sig_atomic_t first_signal = 0;
+volatile std::sig_atomic_t is_quiet = 0;
 
 void leave_at_once(int) {
   _exit(interrupt_exit_code());
@@ -22,16 +23,18 @@ void leave_at_once(int) {
 void on_signal(int number) {
   if (first_signal != 0) _exit(interrupt_exit_code());
   first_signal = number;
+  alarm(kGraceSeconds);
+  if (is_quiet != 0) return;
   const char text[] =
       "\ninterrupted: dropping the open unit (finished units stay; run the same command to go on)\n";
   const ssize_t written = write(STDERR_FILENO, text, std::strlen(text));
   static_cast<void>(written);
-  alarm(kGraceSeconds);
 }
 
 }  // namespace
 
-void install_interrupt_handlers() {
+void install_interrupt_handlers(bool quiet) {
+  is_quiet = quiet ? 1 : 0;
   struct sigaction action {};
   action.sa_handler = on_signal;
   sigaction(SIGINT, &action, nullptr);

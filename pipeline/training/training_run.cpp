@@ -27,6 +27,7 @@
 #include "model/ranks/process_group.h"
 #include "model/ranks/rank_place.h"
 #include "model/trainer.h"
+#include "pipeline/config/device_names.h"
 #include "pipeline/device/domain.h"
 #include "pipeline/run/command_line.h"
 #include "pipeline/run/errors.h"
@@ -71,9 +72,12 @@ fs::path made(const fs::path& folder) {
   return folder;
 }
 
-model::ranks::RankPlace find_place() {
+model::ranks::RankPlace find_place(const std::string& device) {
   try {
-    return model::ranks::rank_place_from_environment();
+    model::ranks::RankPlace place = model::ranks::rank_place_from_environment();
+    config::require_device_for_each_rank(device, place.local_size);
+    model::ranks::tell_launcher(place);
+    return place;
   } catch (const std::invalid_argument& error) {
     throw run::ConfigError(error.what());
   }
@@ -83,7 +87,7 @@ model::DeviceChoice choose_device(const TrainingNetworkConfig& network,
                                   const model::ranks::RankPlace& place) {
   model::configure_compute(network.compute_threads > 0 ? network.compute_threads : own_cores(place));
   try {
-    return model::choose_device(network.device, place.local_rank);
+    return model::choose_device(config::device_of_rank(network.device, place.local_rank), place.local_rank);
   } catch (const std::invalid_argument& error) {
     throw run::ConfigError(error.what());
   }
@@ -256,7 +260,7 @@ class Run {
  public:
   Run(const TrainingConfig& config, const TrainingOptions& options)
       : options_(options),
-        place_(find_place()),
+        place_(find_place(config.network.device)),
         device_(choose_device(config.network, place_)),
         config_(for_device(config, device_.device)),
         ranks_(model::ranks::join_ranks(place_, device_.device)),

@@ -101,6 +101,14 @@ class Ranks(Case):
         self.assertGreater(moved, 0.1)
         self.assertLess(apart / moved, 0.02)
 
+    def test_ranks_that_the_program_starts_itself_train_as_those_of_torchrun(self):
+        config = self.write_config("dropout", initial="with_dropout.safetensors")
+        self.torchrun("torchrun", config=config)
+        result = run(*self.train("own", "--ranks", 2, config=config))
+        self.assertEqual(len(result.stdout.splitlines()), 1)
+        self.assertEqual((self.folder / "own/model.safetensors").read_bytes(),
+                         (self.folder / "torchrun/model.safetensors").read_bytes())
+
     def test_stopped_and_resumed_the_weights_are_the_same_to_the_bit(self):
         config = self.write_config("dropout", initial="with_dropout.safetensors")
         self.torchrun("straight", config=config)

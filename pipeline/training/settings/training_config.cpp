@@ -41,7 +41,7 @@ void parse_network(const json& object, const std::string& where, TrainingNetwork
         "checkpoint holds its own",
         error.what()));
   }
-  config::require_one_device(network.device, where + ": device");
+  config::parse_devices(network.device, where + ": device");
 }
 
 Pools parse_pools(const json& object, const std::string& where) {
