@@ -46,3 +46,18 @@ if(LibTorch_FOUND AND NOT TARGET LibTorch::LibTorch)
     INTERFACE_LINK_LIBRARIES "-Wl,--push-state,--no-as-needed -lstdc++ ${_q3d_torch_link} -Wl,--pop-state")
   unset(_q3d_torch_libs)
 endif()
+
+# The headers of NCCL and CUDA are in wheels that LibTorch's own depends on. LibTorch::Nccl has them if LibTorch was
+# made with CUDA; NCCL itself is a part of what LibTorch links.
+if(LibTorch_FOUND AND EXISTS "${LIBTORCH_ROOT}/lib/libtorch_cuda.so" AND NOT TARGET LibTorch::Nccl)
+  find_path(LIBTORCH_NCCL_INCLUDE_DIR nccl.h HINTS "${LIBTORCH_ROOT}/../nvidia/nccl/include" NO_DEFAULT_PATH)
+  file(GLOB _q3d_cuda_include "${LIBTORCH_ROOT}/../nvidia/cu*/include")
+  find_path(LIBTORCH_CUDA_INCLUDE_DIR cuda_runtime_api.h HINTS ${_q3d_cuda_include} NO_DEFAULT_PATH)
+  if(LIBTORCH_NCCL_INCLUDE_DIR AND LIBTORCH_CUDA_INCLUDE_DIR)
+    add_library(LibTorch::Nccl INTERFACE IMPORTED)
+    set_target_properties(LibTorch::Nccl PROPERTIES
+      INTERFACE_COMPILE_DEFINITIONS Q3D_NCCL
+      INTERFACE_INCLUDE_DIRECTORIES "${LIBTORCH_NCCL_INCLUDE_DIR};${LIBTORCH_CUDA_INCLUDE_DIR}"
+      INTERFACE_SYSTEM_INCLUDE_DIRECTORIES "${LIBTORCH_NCCL_INCLUDE_DIR};${LIBTORCH_CUDA_INCLUDE_DIR}")
+  endif()
+endif()

@@ -31,6 +31,9 @@ class PrimaNet : public torch::nn::Module {
   // adaptation copies for its instances. The network must be frozen and in evaluation mode.
   void pack();
 
+  // Saves memory in training: see Vit::recompute_blocks.
+  void recompute_blocks(bool recomputes) { backbone_->recompute_blocks(recomputes); }
+
   const PrimaConfig& config() const { return config_; }
   const Placement& placement() const { return placement_; }
   const Vit& backbone() const { return *backbone_; }

@@ -2,6 +2,8 @@
 
 #include <string>
 
+#include "model/recomputed.h"
+
 namespace q3d::model {
 namespace {
 
@@ -102,7 +104,8 @@ torch::Tensor Vit::forward(const torch::Tensor& images, const Observer& observe)
   const torch::Tensor placed = patches + pos_embed_.narrow(1, 1, kImageTokens) + pos_embed_.narrow(1, 0, 1);
   torch::Tensor x = torch::cat({cls_token_.expand({images.size(0), -1, -1}), placed}, 1);
   for (std::size_t i = 0; i < blocks_.size(); ++i) {
-    x = blocks_[i]->forward(x);
+    const auto block = [part = blocks_[i]](const torch::Tensor& tokens) { return part->forward(tokens); };
+    x = recomputes_ ? recomputed(block, x, blocks_[i]->parameters()) : block(x);
     if (observe) observe("vit_block" + std::to_string(i), x);
   }
   x = last_norm_->forward(x);

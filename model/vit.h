@@ -27,12 +27,16 @@ class Vit : public torch::nn::Module {
   // tokens.
   torch::Tensor forward(const torch::Tensor& images, const Observer& observe = {}) const;
 
+  // From now on, training keeps only the input of each block and computes the block again (recomputed.h).
+  void recompute_blocks(bool recomputes) { recomputes_ = recomputes; }
+
  private:
   std::unique_ptr<Tokeniser> tokeniser_;
   torch::Tensor pos_embed_;  // (1, 193, embed_dim)
   torch::Tensor cls_token_;  // (1, 1, embed_dim)
   std::vector<std::shared_ptr<VitBlock>> blocks_;
   std::shared_ptr<LayerNorm> last_norm_;
+  bool recomputes_ = false;
 };
 
 }  // namespace q3d::model

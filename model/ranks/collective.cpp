@@ -12,6 +12,7 @@ class SingleRank : public Collective {
  public:
   int rank() const override { return 0; }
   int size() const override { return 1; }
+  std::string transport() const override { return {}; }
   torch::Tensor sum(const torch::Tensor& tensor) const override { return tensor.detach(); }
   torch::Tensor gather(const torch::Tensor& rows) const override { return rows; }
   std::unique_ptr<AveragedBackward> averaged_backward(const std::vector<torch::Tensor>&) const override {

@@ -8,6 +8,7 @@
 #include <torch/types.h>
 
 #include <memory>
+#include <string>
 #include <vector>
 
 namespace q3d::model::ranks {
@@ -36,6 +37,9 @@ class Collective {
 
   virtual int rank() const = 0;  // from 0 to size() - 1
   virtual int size() const = 0;
+  // Returns what moves tensors of the device between the ranks, for people: NCCL, Gloo, or nothing for one
+  // rank.
+  virtual std::string transport() const = 0;
 
   // Elementwise over the ranks, on the tensor's device, without a graph.
   virtual torch::Tensor sum(const torch::Tensor& tensor) const = 0;

@@ -14,6 +14,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "model/ranks/nccl_group.h"
 #include "model/ranks/tcp_store.h"
 
 namespace q3d::model::ranks {
@@ -77,12 +78,19 @@ class ReducedBackward : public AveragedBackward {
   std::unique_ptr<c10d::Reducer> reducer_;
 };
 
+struct Group {
+  GroupPointer pointer;
+  std::string transport;  // of tensors on the device
+};
+
 class Ranks : public Collective {
  public:
-  Ranks(RankPlace place, GroupPointer group) : place_(std::move(place)), group_(std::move(group)) {}
+  Ranks(RankPlace place, Group group)
+      : place_(std::move(place)), group_(std::move(group.pointer)), transport_(std::move(group.transport)) {}
 
   int rank() const override { return place_.rank; }
   int size() const override { return place_.size; }
+  std::string transport() const override { return transport_; }
 
   torch::Tensor sum(const torch::Tensor& tensor) const override {
     return together(place_, [&] {
@@ -113,10 +121,21 @@ class Ranks : public Collective {
  private:
   RankPlace place_;
   GroupPointer group_;
+  std::string transport_;
 };
 
-// Gloo for tensors on the CPU and, over a copy on the host, on a GPU.
-GroupPointer open_group(const RankPlace& place, torch::Device device) {
+// Returns whether all ranks of the group say yes.
+bool all_say(const GroupPointer& group, bool yes) {
+  std::vector<torch::Tensor> words{torch::tensor({yes ? 1 : 0})};
+  c10d::AllreduceOptions options;
+  options.reduceOp = c10d::ReduceOp::MIN;
+  group->allreduce(words, options)->wait();
+  return words.front().item<int>() == 1;
+}
+
+// Gloo for tensors on the CPU. For those on GPUs NCCL, or Gloo over a copy on the host where not every rank
+// can use NCCL.
+Group open_group(const RankPlace& place, torch::Device device) {
   const auto store = open_tcp_store(place, "training", Gathering::together);
   // The interface is that of the host's name, or GLOO_SOCKET_IFNAME.
   const auto options = c10d::ProcessGroupGloo::Options::create_default(place.join_timeout);
@@ -124,9 +143,14 @@ GroupPointer open_group(const RankPlace& place, torch::Device device) {
   gloo->setTimeout(place.answer_timeout);
   auto group = c10::make_intrusive<c10d::ProcessGroup>(store, place.rank, place.size);
   group->setBackend(torch::kCPU, c10d::ProcessGroup::BackendType::GLOO, gloo);
-  if (!device.is_cpu()) group->setBackend(device.type(), c10d::ProcessGroup::BackendType::GLOO, gloo);
   group->setDefaultBackend(c10d::ProcessGroup::BackendType::GLOO);
-  return group;
+  const bool has_nccl = all_say(group, can_use_nccl(place, device));
+  if (has_nccl) {
+    group->setBackend(device.type(), c10d::ProcessGroup::BackendType::NCCL, open_nccl(place, store));
+  } else if (!device.is_cpu()) {
+    group->setBackend(device.type(), c10d::ProcessGroup::BackendType::GLOO, gloo);
+  }
+  return {group, has_nccl ? "NCCL" : "Gloo"};
 }
 
 }  // namespace

@@ -6,22 +6,27 @@
 #include <CLI/Formatter.hpp>
 
 #include <array>
+#include <cstdint>
 #include <functional>
 #include <string>
 #include <string_view>
 
 namespace q3d::pipeline::cli {
 
+// What the ranks of a command do: nothing, since it has no --ranks; units, which others make again if a rank
+// is lost; or steps, for which every rank is needed.
+enum class RankWork : std::uint8_t { none, units, steps };
+
 struct CommandInfo {
   std::string_view name;
   std::string_view description;  // one line of `quadruped3d --help`
   bool needs_network;            // runs in quadruped3d-network, which links LibTorch and has all commands
   std::string_view network_option{};  // with this option, the command runs there too
-  bool shares_work = false;           // has --ranks
+  RankWork rank_work = RankWork::none;
 };
 inline constexpr std::array<CommandInfo, 27> kCommands{{
-    {"build", "make a versioned dataset of labels from annotated photographs", true, {}, true},
-    {"calibrate", "find the thresholds that give the wanted shares of labels", true, {}, true},
+    {"build", "make a versioned dataset of labels from annotated photographs", true, {}, RankWork::units},
+    {"calibrate", "find the thresholds that give the wanted shares of labels", true, {}, RankWork::units},
     {"predict", "give the bodies of animals in photographs, with or without keypoints", true},
     {"verify", "read a whole dataset and check every byte of it", false, "--repair"},
     {"status", "list the builds of an output folder, and how far each of their stages has come", false},
@@ -31,8 +36,8 @@ inline constexpr std::array<CommandInfo, 27> kCommands{{
     {"report", "write a page that shows a whole dataset, and its numbers as JSON", true},
     {"sample", "render pictures of quadrupeds with known 3D truth, in the layouts of public datasets", true},
     {"init", "write an untrained checkpoint, or the synthetic body model and its priors", true},
-    {"train", "train a network from shards", true, {}, true},
-    {"evaluate", "measure a network on test sets with the paper's metrics", true, {}, true},
+    {"train", "train a network from shards", true, {}, RankWork::steps},
+    {"evaluate", "measure a network on test sets with the paper's metrics", true, {}, RankWork::units},
     {"compare", "test whether one network is better than another on the same pictures", true},
     {"evaluate-labels", "measure how close the labels of a build are to known truth", true},
     {"compare-labels", "test which of two builds' rules keep the more accurate labels, at equal yield", true},

@@ -37,8 +37,8 @@ using Clock = std::chrono::steady_clock;
 constexpr int kFailure = 1;
 constexpr int kUsage = 2;
 constexpr int kSignalled = 128;  // a shell's exit code for a process that a signal ended, less the signal
-// Ranks leave by themselves when rank 0 has ended, after the units that they have open. Those that do not
-// within this time are ended, then killed.
+// Ranks leave by themselves when rank 0, or any that is needed, has ended. Those that do not within this
+// time are ended, then killed.
 constexpr std::chrono::seconds kTimeToLeave{30};
 constexpr std::chrono::seconds kTimeToStop{10};
 
@@ -127,7 +127,8 @@ bool ignores_hangups() {
 
 class LocalRanks {
  public:
-  LocalRanks(char** argv, int ranks) : argv_(argv), pids_(static_cast<std::size_t>(ranks), 0) {}
+  LocalRanks(char** argv, const WantedRanks& ranks)
+      : argv_(argv), pids_(static_cast<std::size_t>(ranks.count), 0), are_all_needed_(ranks.are_all_needed) {}
 
   int run() {
     start(0);
@@ -234,10 +235,8 @@ class LocalRanks {
 
   void note_end(std::size_t rank, int status) {
     const int code = WIFEXITED(status) ? WEXITSTATUS(status) : kSignalled + WTERMSIG(status);
-    if (rank == 0) {
-      code_of_rank_0_ = code;
-      deadline_ = Clock::now() + kTimeToLeave;
-    }
+    if (rank == 0) code_of_rank_0_ = code;
+    if (!deadline_ && (rank == 0 || (are_all_needed_ && code != 0))) deadline_ = Clock::now() + kTimeToLeave;
     if (!is_stopping_ && code != 0) tell_end(rank, status, code);
   }
 
@@ -249,14 +248,14 @@ class LocalRanks {
     } else if (rank != 0) {
       fmt::print(stderr, "quadruped3d: rank {} of {} ended with exit code {}\n", rank, pids_.size(), code);
     }
-    if (rank == 0 && are_running()) {
-      fmt::print(stderr, "quadruped3d: the other ranks have {} s to finish their open units\n",
+    if (deadline_ && are_running()) {
+      fmt::print(stderr, "quadruped3d: the other ranks have {} s to finish what they are at\n",
                  kTimeToLeave.count());
     }
   }
 
   void end_stragglers() {
-    if (is_running(0) || Clock::now() < deadline_) return;
+    if (!deadline_ || Clock::now() < *deadline_) return;
     ::kill(-group_, is_ending_ ? SIGKILL : SIGTERM);
     is_ending_ = true;
     is_stopping_ = true;
@@ -265,42 +264,46 @@ class LocalRanks {
 
   char** argv_;
   std::vector<pid_t> pids_;  // by rank; 0 for one that has ended or has not started
-  pid_t group_ = 0;          // of the ranks' processes: the id of rank 0's
+  bool are_all_needed_;
+  pid_t group_ = 0;  // of the ranks' processes: the id of rank 0's
   ListeningSocket socket_ = listen_on_loopback();
   Pipe ready_ = open_pipe();
   sigset_t signals_before_{};
   int signals_ = hold_signals(signals_before_);
   int code_of_rank_0_ = kFailure;
-  bool has_led_ = false;      // rank 0 has read its config, or ended
-  bool is_stopping_ = false;  // a signal has asked all ranks to end
-  bool is_ending_ = false;    // ranks that outlived rank 0 got SIGTERM
-  Clock::time_point deadline_{};
+  bool has_led_ = false;                       // rank 0 has read its config, or ended
+  bool is_stopping_ = false;                   // a signal has asked all ranks to end
+  bool is_ending_ = false;                     // ranks that outlived their deadline got SIGTERM
+  std::optional<Clock::time_point> deadline_;  // for the ranks that still run
 };
 
 }  // namespace
 
-int wanted_ranks(std::span<char* const> arguments) {
-  if (arguments.empty()) return 1;
+WantedRanks wanted_ranks(std::span<char* const> arguments) {
+  if (arguments.empty()) return {};
   const auto info = std::find_if(kCommands.begin(), kCommands.end(), [&](const CommandInfo& each) {
     return each.name == std::string_view(arguments.front());
   });
-  if (info == kCommands.end() || !info->shares_work) return 1;
+  if (info == kCommands.end() || info->rank_work == RankWork::none) return {};
   const bool asks_for_help = std::any_of(arguments.begin(), arguments.end(), [](std::string_view word) {
     return word == "-h" || word == "--help";
   });
-  if (asks_for_help) return 1;
-  if (const auto text = text_of("--ranks", arguments)) return number_of_ranks(*text).value_or(1);
+  if (asks_for_help) return {};
+  const bool are_all_needed = info->rank_work == RankWork::steps;
+  if (const auto text = text_of("--ranks", arguments)) {
+    return {number_of_ranks(*text).value_or(1), are_all_needed};
+  }
   const std::string_view devices = text_of("--device", arguments).value_or("");
-  return 1 + static_cast<int>(std::count(devices.begin(), devices.end(), ','));
+  return {1 + static_cast<int>(std::count(devices.begin(), devices.end(), ',')), are_all_needed};
 }
 
-int run_ranks(char** argv, int ranks) {
+int run_ranks(char** argv, const WantedRanks& ranks) {
   if (const char* variable = other_launcher()) {
     fmt::print(
         stderr,
         "quadruped3d: --ranks {}: the environment variable {} says that a launcher has started this "
         "process as one of several ranks; leave out --ranks, or start the program without the launcher\n",
-        ranks, variable);
+        ranks.count, variable);
     return kUsage;
   }
   try {

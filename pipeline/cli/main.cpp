@@ -15,8 +15,8 @@ int main(int argc, char** argv) {
   const std::size_t command = argc > 2 && std::string_view(argv[1]) == "help" ? 2 : 1;
   const auto words = std::span(argv, static_cast<std::size_t>(argc));
   if (words.size() > command && cli::needs_network(words.subspan(command))) {
-    const int ranks = cli::wanted_ranks(words.subspan(command));
-    return ranks > 1 ? cli::run_ranks(argv, ranks) : cli::become_network_program(argv);
+    const cli::WantedRanks ranks = cli::wanted_ranks(words.subspan(command));
+    return ranks.count > 1 ? cli::run_ranks(argv, ranks) : cli::become_network_program(argv);
   }
   return cli::run_program(argc, argv, cli::kPlainCommands);
 }

@@ -211,7 +211,9 @@ const Settings<NetworkConfig>& network_settings() {
        .is_required = true},
       {.key = "device",
        .member = &NetworkConfig::device,
-       .description = "`auto` (a usable GPU, else the CPU), `cpu`, `cuda`, `cuda:I`"},
+       .description =
+           "`auto` (a usable GPU, else the CPU), `cpu`, `cuda`, `cuda:I`, or one GPU for each rank, "
+           "such as `cuda:0,cuda:1`"},
       {.key = "dtype",
        .member = word_of(&NetworkConfig::dtype, dtype_from_string),
        .description = "number type of the network",

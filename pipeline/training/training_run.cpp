@@ -286,8 +286,8 @@ class Run {
     run::log_info(
         fmt::format("training on {} in {}", device_.description, to_string(config_.network.precision)));
     if (ranks_->size() > 1) {
-      run::log_info(fmt::format("{} ranks, each with {} of a batch's {} samples", ranks_->size(),
-                                config.feed.batch / ranks_->size(), config.feed.batch));
+      run::log_info(fmt::format("{} ranks, each with {} of a batch's {} samples, over {}", ranks_->size(),
+                                config.feed.batch / ranks_->size(), config.feed.batch, ranks_->transport()));
     }
     if (stored_) {
       run::log_info(fmt::format("going on at step {} of phase {}", position_.step, position_.phase + 1));
@@ -384,6 +384,7 @@ class Run {
     model::PrimaConfig sizes = from->config();
     sizes.ief_iterations = phase.ief_iterations;
     const auto net = model::with_config(*from, sizes);
+    net->recompute_blocks(config_.network.recompute);
     const int threads = options_.threads == 0 && place_.size > 1 ? own_cores(place_) : options_.threads;
     const feed::Feed feed = open_feed(config_, phase, position_.phase, threads, pools_, *ranks_);
     const std::unique_ptr<model::Learner> learner = make_learner(net, phase, feed);

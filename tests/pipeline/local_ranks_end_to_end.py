@@ -131,7 +131,7 @@ class LocalRanks(SceneCase):
     def test_ranks_that_outlive_rank_0_are_ended(self):
         with self.hanging() as (launcher, processes):
             os.kill(processes[0], signal.SIGKILL)
-            launcher.wait_for_line("the other ranks have 30 s to finish their open units")
+            launcher.wait_for_line("the other ranks have 30 s to finish what they are at")
             self.assertEqual(launcher.wait(), 128 + signal.SIGKILL, launcher.stderr())
             self.assert_all_end(processes)
 

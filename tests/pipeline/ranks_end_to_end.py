@@ -12,7 +12,7 @@ import sys
 import numpy as np
 
 from e2e import (LIMIT_S, Case, draw_pictures, give_bodies, make_network, prima_dataset, program, read_safetensors,
-                 run, split_safetensors, wait_until, write_annotations, write_json, write_safetensors)
+                 run, split_safetensors, started, wait_until, write_annotations, write_json, write_safetensors)
 
 STEPS = 3
 
@@ -108,6 +108,24 @@ class Ranks(Case):
         self.assertEqual(len(result.stdout.splitlines()), 1)
         self.assertEqual((self.folder / "own/model.safetensors").read_bytes(),
                          (self.folder / "torchrun/model.safetensors").read_bytes())
+
+    def test_blocks_that_are_computed_again_change_no_bit(self):
+        config = self.write_config("dropout", initial="with_dropout.safetensors")
+        for ranks in (1, 2):
+            run(*self.train(f"plain{ranks}", "--ranks", ranks, config=config))
+            run(*self.train(f"again{ranks}", "--ranks", ranks, "--set", "network.recompute=true", config=config))
+            self.assertEqual((self.folder / f"plain{ranks}/model.safetensors").read_bytes(),
+                             (self.folder / f"again{ranks}/model.safetensors").read_bytes())
+
+    def test_a_killed_rank_ends_the_training(self):
+        config = self.write_config("long", stages={"1": [{"name": "long", "pools": ["truth"], "steps": 100000}]})
+        log = self.folder / "long/log.jsonl"
+        with started(*self.train("long", "--ranks", 2, config=config)) as launcher:
+            wait_until(lambda: log.exists() and log.stat().st_size > 0 or launcher.process.poll() is not None, "a step")
+            os.kill(self.rank(launcher.pid, 1), signal.SIGKILL)
+            self.assertEqual(launcher.wait(), 1, launcher.stderr())
+            self.assertIn("rank 1 of 2 was ended by signal 9", launcher.stderr())
+            self.assertIn("rank 0 of 2: working with the other ranks failed", launcher.stderr())
 
     def test_stopped_and_resumed_the_weights_are_the_same_to_the_bit(self):
         config = self.write_config("dropout", initial="with_dropout.safetensors")

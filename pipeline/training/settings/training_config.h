@@ -24,6 +24,7 @@ struct TrainingNetworkConfig {
   std::string device = "auto";
   Precision precision = Precision::float32;
   int compute_threads = 0;  // 0 = all cores; can change the last bits
+  bool recompute = false;   // the ViT's blocks in the backward pass; never changes a bit
 };
 
 struct PoolConfig {

@@ -148,7 +148,9 @@ const Settings<TrainingNetworkConfig>& training_network_settings() {
        .is_required = true},
       {.key = "device",
        .member = &Config::device,
-       .description = "`auto` (a usable GPU, else the CPU), `cpu`, `cuda`, `cuda:I`"},
+       .description =
+           "`auto` (a usable GPU, else the CPU), `cpu`, `cuda`, `cuda:I`, or one GPU for each rank, "
+           "such as `cuda:0,cuda:1`"},
       {.key = "precision",
        .member = enum_word<Config, Precision>(&Config::precision, &to_string, &precision_from_string),
        .description =
@@ -163,7 +165,11 @@ const Settings<TrainingNetworkConfig>& training_network_settings() {
        .member = &Config::compute_threads,
        .description = "threads of one CPU operator; 0 takes all cores. They can change the last bits of a "
                       "result",
-       .range = kNotNegative}};
+       .range = kNotNegative},
+      {.key = "recompute",
+       .member = &Config::recompute,
+       .description = "saves memory: of each block of the ViT, only the input is kept, and the backward pass "
+                      "computes the block again. The weights are the same to the bit"}};
   return kSettings;
 }
 

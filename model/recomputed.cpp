@@ -1,0 +1,126 @@
+#include "model/recomputed.h"
+
+#include <ATen/autocast_mode.h>
+#include <torch/csrc/autograd/autograd.h>
+#include <torch/csrc/autograd/custom_function.h>
+#include <torch/custom_class.h>
+
+#include <mutex>
+#include <utility>
+
+namespace q3d::model {
+namespace {
+
+using torch::autograd::AutogradContext;
+using torch::autograd::variable_list;
+
+at::Generator generator_of(torch::Device device) {
+  return at::globalContext().defaultGenerator(device);
+}
+
+torch::Tensor state_of(at::Generator generator) {
+  const std::lock_guard lock(generator.mutex());
+  return generator.get_state();
+}
+
+void set_state(at::Generator generator, const torch::Tensor& state) {
+  const std::lock_guard lock(generator.mutex());
+  generator.set_state(state);
+}
+
+// A call of a part, and what besides its input decides its result.
+struct Call : torch::CustomClassHolder {
+  Call(NetworkPart called, std::vector<torch::Tensor> uses, torch::Device on)
+      : part(std::move(called)),
+        parameters(std::move(uses)),
+        device(on),
+        draws(state_of(generator_of(on))),
+        is_mixed(at::autocast::is_autocast_enabled(on.type())),
+        mixed_dtype(at::autocast::get_autocast_dtype(on.type())) {}
+
+  NetworkPart part;
+  std::vector<torch::Tensor> parameters;
+  torch::Device device;
+  torch::Tensor draws;  // state of the generator
+  bool is_mixed;
+  at::ScalarType mixed_dtype;
+};
+
+// Restores the generator and the autocast of a call for one scope.
+class AsInCall {
+ public:
+  explicit AsInCall(const Call& call)
+      : call_(call),
+        draws_(state_of(generator_of(call.device))),
+        was_mixed_(at::autocast::is_autocast_enabled(call.device.type())),
+        mixed_dtype_(at::autocast::get_autocast_dtype(call.device.type())) {
+    set_state(generator_of(call.device), call.draws);
+    at::autocast::increment_nesting();
+    set_autocast(call.is_mixed, call.mixed_dtype);
+  }
+  ~AsInCall() {
+    if (at::autocast::decrement_nesting() == 0) at::autocast::clear_cache();
+    set_autocast(was_mixed_, mixed_dtype_);
+    set_state(generator_of(call_.device), draws_);
+  }
+  AsInCall(const AsInCall&) = delete;
+  AsInCall& operator=(const AsInCall&) = delete;
+
+ private:
+  void set_autocast(bool enabled, at::ScalarType dtype) const {
+    at::autocast::set_autocast_enabled(call_.device.type(), enabled);
+    at::autocast::set_autocast_dtype(call_.device.type(), dtype);
+  }
+
+  const Call& call_;
+  torch::Tensor draws_;
+  bool was_mixed_;
+  at::ScalarType mixed_dtype_;
+};
+
+// The parameters are inputs of the function too, so that a search of the graph finds them (c10d's Reducer
+// makes one).
+struct Recomputed : torch::autograd::Function<Recomputed> {
+  static torch::Tensor forward(AutogradContext* context, const torch::Tensor& input, at::TensorList,
+                               const c10::intrusive_ptr<Call>& call) {
+    context->save_for_backward({input});
+    context->saved_data["call"] = c10::IValue::make_capsule(call);
+    const at::AutoGradMode with_gradients(true);  // the operators must choose the kernels of a plain call
+    return call->part(input.detach().requires_grad_()).detach();
+  }
+
+  static variable_list backward(AutogradContext* context, const variable_list& gradients) {
+    const auto call = c10::static_intrusive_pointer_cast<Call>(context->saved_data["call"].toCapsule());
+    const torch::Tensor input = context->get_saved_variables().at(0).detach().requires_grad_();
+    variable_list leaves{input};
+    for (const torch::Tensor& parameter : call->parameters) {
+      if (parameter.requires_grad()) leaves.push_back(parameter);
+    }
+    const at::AutoGradMode with_gradients(true);
+    torch::Tensor output;
+    {
+      const AsInCall as_in_call(*call);
+      output = call->part(input);
+    }
+    const variable_list found = torch::autograd::grad({output}, leaves, gradients, /*retain_graph=*/false,
+                                                      /*create_graph=*/false, /*allow_unused=*/true);
+    variable_list all{found.front()};
+    auto next = found.begin() + 1;
+    for (const torch::Tensor& parameter : call->parameters) {
+      all.push_back(parameter.requires_grad() ? *next++ : torch::Tensor());
+    }
+    all.emplace_back();  // of the call
+    return all;
+  }
+};
+
+}  // namespace
+
+torch::Tensor recomputed(const NetworkPart& part, const torch::Tensor& input,
+                         const std::vector<torch::Tensor>& parameters) {
+  if (!at::GradMode::is_enabled()) return part(input);
+  return Recomputed::apply(input, at::TensorList(parameters),
+                           c10::make_intrusive<Call>(part, parameters, input.device()));
+}
+
+}  // namespace q3d::model
