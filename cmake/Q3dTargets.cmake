@@ -107,6 +107,8 @@ endfunction()
 # q3d_test(NAME SOURCES ... LIBS ... [LABEL label] [TORCH]): one GoogleTest binary. Each of its test cases is a ctest
 # entry, NAME.Suite.Case. A binary that loads LibTorch takes half a second to start, so with TORCH each suite is an
 # entry instead, NAME.Suite.
+# TIMEOUT only ends a test that hangs; sanitizers make some ten times slower.
+set(Q3D_TEST_TIMEOUT 3600)
 include(GoogleTest)
 function(q3d_test name)
   cmake_parse_arguments(ARG "TORCH" "LABEL" "SOURCES;LIBS" ${ARGN})
@@ -123,10 +125,10 @@ function(q3d_test name)
   endif()
   if(ARG_TORCH)
     target_link_libraries(${name} PRIVATE q3d_torch)
-    q3d_discover_suites(${name} ${ARG_LABEL} 600)
+    q3d_discover_suites(${name} ${ARG_LABEL} ${Q3D_TEST_TIMEOUT})
   else()
     gtest_discover_tests(${name} TEST_PREFIX "${name}." DISCOVERY_TIMEOUT 120
-                         PROPERTIES LABELS ${ARG_LABEL} TIMEOUT 600)
+                         PROPERTIES LABELS ${ARG_LABEL} TIMEOUT ${Q3D_TEST_TIMEOUT})
   endif()
 endfunction()
 

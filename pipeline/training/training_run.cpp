@@ -306,7 +306,7 @@ class Run {
     auto net = initial_net(config_.network, asset_, device_.device);
     if (stored_) model::restore_parameters(stored_->file, "", *net);
     while (position_.phase < static_cast<int>(config_.phases.size()) && !limit_reached(summary)) {
-      net = run_phase(net, log, progress, summary);
+      net = run_phase(std::move(net), log, progress, summary);
     }
     summary.steps_done = steps_done();
     summary.finished = position_.phase == static_cast<int>(config_.phases.size());
@@ -377,13 +377,14 @@ class Run {
   }
 
   // Runs the current phase from the current step to its end, or until this call must stop.
-  std::shared_ptr<model::PrimaNet> run_phase(const std::shared_ptr<model::PrimaNet>& from,
+  std::shared_ptr<model::PrimaNet> run_phase(std::shared_ptr<model::PrimaNet> from,
                                              std::optional<TrainingLog>& log, run::Progress& progress,
                                              TrainingSummary& summary) {
     const PhaseConfig& phase = config_.phases[static_cast<std::size_t>(position_.phase)];
     model::PrimaConfig sizes = from->config();
     sizes.ief_iterations = phase.ief_iterations;
     const auto net = model::with_config(*from, sizes);
+    from.reset();  // at full size it takes 3.5 GB
     net->recompute_blocks(config_.network.recompute);
     const int threads = options_.threads == 0 && place_.size > 1 ? own_cores(place_) : options_.threads;
     const feed::Feed feed = open_feed(config_, phase, position_.phase, threads, pools_, *ranks_);
