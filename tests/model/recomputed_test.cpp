@@ -21,7 +21,7 @@ struct Result {
 Result run(const NetworkPart& part, const torch::Tensor& input, const std::vector<torch::Tensor>& parameters,
            bool is_recomputed, bool is_mixed) {
   at::manual_seed(5);
-  for (torch::Tensor parameter : parameters) parameter.mutable_grad().reset();
+  for (const torch::Tensor& parameter : parameters) parameter.mutable_grad().reset();
   const torch::Tensor leaf = input.detach().clone().requires_grad_();
   Result result;
   {
