@@ -84,7 +84,7 @@ TrainingConfig load_training_config(const std::vector<std::filesystem::path>& fi
                                     const std::vector<std::string>& settings = {});
 
 // Checks and converts merged JSON; `where` names it in messages.
-TrainingConfig parse_training_config(const nlohmann::json& json, const std::string& where,
+TrainingConfig parse_training_config(const nlohmann::json& merged, const std::string& where,
                                      const std::string& stage);
 
 // Returns the effective values that decide the trained weights, as one JSON document. Defaults are filled in,
