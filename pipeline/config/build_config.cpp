@@ -203,6 +203,7 @@ json expand_profile(const json& merged, const std::string& where) {
 
 std::vector<std::string> names_of(const std::vector<DatasetConfig>& datasets) {
   std::vector<std::string> names;
+  names.reserve(datasets.size());
   for (const DatasetConfig& dataset : datasets) names.push_back(dataset.name);
   return names;
 }

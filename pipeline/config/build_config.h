@@ -142,7 +142,7 @@ std::vector<DatasetConfig> parse_datasets(const nlohmann::json& list, const std:
 void resolve_dataset_paths(nlohmann::json& object, const char* key, const std::filesystem::path& folder);
 
 // Checks and converts merged JSON; `where` names it in messages.
-BuildConfig parse_build_config(const nlohmann::json& json, const std::string& where,
+BuildConfig parse_build_config(const nlohmann::json& merged, const std::string& where,
                                NetworkKey network_key = NetworkKey::required);
 
 // Throws ConfigError that names the first dataset without keypoints, whose predictions nothing can judge.
