@@ -2,6 +2,12 @@
 #include "model/recomputed.h"
 
 #include <gtest/gtest.h>
+#include <torch/csrc/autograd/function.h>
+
+#include <algorithm>
+#include <set>
+#include <string>
+#include <vector>
 
 #include "model/config.h"
 #include "model/init.h"
@@ -43,7 +49,8 @@ void expect_equal(const Result& a, const Result& b) {
   ASSERT_EQ(a.gradients.size(), b.gradients.size());
   for (std::size_t i = 0; i < a.gradients.size(); ++i) {
     ASSERT_EQ(a.gradients[i].defined(), b.gradients[i].defined()) << i;
-    if (a.gradients[i].defined()) EXPECT_TRUE(torch::equal(a.gradients[i], b.gradients[i])) << i;
+    if (!a.gradients[i].defined()) continue;
+    EXPECT_TRUE(torch::equal(a.gradients[i], b.gradients[i])) << i;
   }
 }
 
@@ -67,6 +74,20 @@ TEST(Recomputed, EqualsAPlainCallWithDrawsAndInMixedPrecision) {
   }
 }
 
+TEST(Recomputed, ComputesThePartAgainInTheBackwardPass) {
+  int calls = 0;
+  const NetworkPart part = [&](const torch::Tensor& x) {
+    ++calls;
+    return x * x;
+  };
+  const torch::Tensor input = torch::full({1}, 3.0).requires_grad_();
+  const torch::Tensor output = recomputed(part, input, {});
+  EXPECT_EQ(calls, 1);
+  output.backward();
+  EXPECT_EQ(calls, 2);
+  EXPECT_EQ(input.grad().item<float>(), 6.0F);
+}
+
 TEST(Recomputed, IsAPlainCallWithoutGradients) {
   const at::NoGradGuard none;
   int calls = 0;
@@ -78,6 +99,21 @@ TEST(Recomputed, IsAPlainCallWithoutGradients) {
   EXPECT_EQ(calls, 1);
 }
 
+// Returns how many nodes of the graph behind a result have a name that contains the word.
+std::size_t count_nodes(const torch::Tensor& result, const std::string& word) {
+  std::set<torch::autograd::Node*> seen;
+  std::vector<torch::autograd::Node*> open{result.grad_fn().get()};
+  while (!open.empty()) {
+    torch::autograd::Node* node = open.back();
+    open.pop_back();
+    if (node == nullptr || !seen.insert(node).second) continue;
+    for (const auto& edge : node->next_edges()) open.push_back(edge.function.get());
+  }
+  return static_cast<std::size_t>(std::count_if(seen.begin(), seen.end(), [&](torch::autograd::Node* node) {
+    return node->name().find(word) != std::string::npos;
+  }));
+}
+
 // Returns the ViT's tokens in training, and the gradients of a weighted sum of them.
 std::vector<torch::Tensor> tokens_and_gradients(PrimaNet& net, bool recomputes) {
   at::manual_seed(3);
@@ -85,6 +121,8 @@ std::vector<torch::Tensor> tokens_and_gradients(PrimaNet& net, bool recomputes) 
   net.zero_grad();
   const torch::Tensor images = torch::linspace(-1, 1, 2 * 3 * 256 * 256).view({2, 3, 256, 256});
   const torch::Tensor tokens = net.image_tokens(images);
+  const auto blocks = static_cast<std::size_t>(net.config().depth);
+  EXPECT_EQ(count_nodes(tokens, "Recomputed"), recomputes ? blocks : 0U);
   (tokens * torch::linspace(-1, 1, tokens.numel()).view_as(tokens)).sum().backward();
   std::vector<torch::Tensor> all{tokens.detach()};
   for (const torch::Tensor& parameter : net.backbone().parameters()) all.push_back(parameter.grad().clone());
