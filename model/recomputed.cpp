@@ -8,6 +8,8 @@
 #include <mutex>
 #include <utility>
 
+#include "model/mixed_precision.h"
+
 namespace q3d::model {
 namespace {
 
@@ -35,47 +37,29 @@ struct Call : torch::CustomClassHolder {
         parameters(std::move(uses)),
         device(on),
         draws(state_of(generator_of(on))),
-        is_mixed(at::autocast::is_autocast_enabled(on.type())),
-        mixed_dtype(at::autocast::get_autocast_dtype(on.type())) {}
+        is_mixed(at::autocast::is_autocast_enabled(on.type())) {}
 
   NetworkPart part;
   std::vector<torch::Tensor> parameters;
   torch::Device device;
   torch::Tensor draws;  // state of the generator
-  bool is_mixed;
-  at::ScalarType mixed_dtype;
+  bool is_mixed;        // see MixedPrecision
 };
 
-// Restores the generator and the autocast of a call for one scope.
-class AsInCall {
+// Lets the generator draw for one scope what it drew in a call.
+class DrawsOfCall {
  public:
-  explicit AsInCall(const Call& call)
-      : call_(call),
-        draws_(state_of(generator_of(call.device))),
-        was_mixed_(at::autocast::is_autocast_enabled(call.device.type())),
-        mixed_dtype_(at::autocast::get_autocast_dtype(call.device.type())) {
-    set_state(generator_of(call.device), call.draws);
-    at::autocast::increment_nesting();
-    set_autocast(call.is_mixed, call.mixed_dtype);
+  explicit DrawsOfCall(const Call& call)
+      : generator_(generator_of(call.device)), present_(state_of(generator_)) {
+    set_state(generator_, call.draws);
   }
-  ~AsInCall() {
-    if (at::autocast::decrement_nesting() == 0) at::autocast::clear_cache();
-    set_autocast(was_mixed_, mixed_dtype_);
-    set_state(generator_of(call_.device), draws_);
-  }
-  AsInCall(const AsInCall&) = delete;
-  AsInCall& operator=(const AsInCall&) = delete;
+  ~DrawsOfCall() { set_state(generator_, present_); }
+  DrawsOfCall(const DrawsOfCall&) = delete;
+  DrawsOfCall& operator=(const DrawsOfCall&) = delete;
 
  private:
-  void set_autocast(bool enabled, at::ScalarType dtype) const {
-    at::autocast::set_autocast_enabled(call_.device.type(), enabled);
-    at::autocast::set_autocast_dtype(call_.device.type(), dtype);
-  }
-
-  const Call& call_;
-  torch::Tensor draws_;
-  bool was_mixed_;
-  at::ScalarType mixed_dtype_;
+  at::Generator generator_;
+  torch::Tensor present_;
 };
 
 // The parameters are inputs of the function too, so that a search of the graph finds them (c10d's Reducer
@@ -99,7 +83,8 @@ struct Recomputed : torch::autograd::Function<Recomputed> {
     const at::AutoGradMode with_gradients(true);
     torch::Tensor output;
     {
-      const AsInCall as_in_call(*call);
+      const DrawsOfCall draws(*call);
+      const MixedPrecision mixed(call->device, call->is_mixed);
       output = call->part(input);
     }
     const variable_list found = torch::autograd::grad({output}, leaves, gradients, /*retain_graph=*/false,

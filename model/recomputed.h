@@ -14,8 +14,8 @@ namespace q3d::model {
 using NetworkPart = std::function<torch::Tensor(const torch::Tensor&)>;
 
 // Returns part(input). Output and gradients are bit for bit those of a plain call; the part is computed once
-// more for the backward pass, with the same autocast and, if it draws from LibTorch's default generator of
-// the input's device, with the same draws. `parameters` are all leaves that the part uses. Gradients of
+// more for the backward pass, with the same MixedPrecision and, if it draws from LibTorch's default generator
+// of the input's device, with the same draws. `parameters` are all leaves that the part uses. Gradients of
 // gradients are refused by LibTorch.
 torch::Tensor recomputed(const NetworkPart& part, const torch::Tensor& input,
                          const std::vector<torch::Tensor>& parameters);
