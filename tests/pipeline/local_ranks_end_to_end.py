@@ -8,7 +8,7 @@ import shutil
 import signal
 import subprocess
 
-from e2e import LIMIT_S, Fault, Scene, SceneCase, command, digests, run, run_json, started, wait_until
+from e2e import LIMIT_S, Fault, SmallUnitsCase, command, ranks_of, run, run_json, started, wait_until
 
 # A rank hangs when it writes its first shard, or soon after.
 IN_SHARDS = Fault("shards-", "sync", "hang", skip=2)
@@ -25,36 +25,9 @@ def is_alive(pid):
     return state_of(pid) not in (None, "Z", "X")
 
 
-def ranks_of(launcher):
-    """{rank: process id} of the processes that a launcher has started."""
-    found = {}
-    children = pathlib.Path(f"/proc/{launcher}/task/{launcher}/children").read_text().split()
-    for child in children:
-        variables = pathlib.Path(f"/proc/{child}/environ").read_bytes().split(b"\0")
-        found.update({int(variable[len(b"RANK="):]): int(child) for variable in variables
-                      if variable.startswith(b"RANK=")})
-    return found
-
-
-class LocalRanks(SceneCase):
-    @classmethod
-    def prepare(cls):
-        Scene.make(cls.shared).build_in_small_units("one")
-
-    def setUp(self):
-        super().setUp()
-        self.config = self.shared / "fine.json"
-
+class LocalRanks(SmallUnitsCase):
     def words(self, *more):
         return self.scene.build_words("out", *more, config=self.config)
-
-    def files(self, out):
-        """Every file below `out` with its digest, without the caches and the plan, which hold paths or times."""
-        return {name: digest for name, digest in digests(out).items()
-                if not name.startswith("stages/builds/") and name not in (".lock", "digests.txt")}
-
-    def assert_equals_one(self):
-        self.assertEqual(self.files(self.folder / "out"), self.files(self.shared / "one"))
 
     @contextlib.contextmanager
     def hanging(self, ranks=2):
@@ -112,8 +85,7 @@ class LocalRanks(SceneCase):
 
     def test_a_killed_rank_is_named_and_the_others_finish(self):
         with started(*self.words("--ranks", 2)) as launcher:
-            wait_until(lambda: launcher.process.poll() is not None or 1 in ranks_of(launcher.pid), "rank 1")
-            os.kill(ranks_of(launcher.pid)[1], signal.SIGKILL)
+            os.kill(wait_until(lambda: ranks_of(launcher.pid).get(1), "rank 1"), signal.SIGKILL)
             self.assertEqual(launcher.wait(), 0, launcher.stderr())
             self.assertIn("rank 1 of 2 was ended by signal 9 (Killed)", launcher.stderr())
         self.assert_equals_one()

@@ -3,7 +3,6 @@ together."""
 
 import json
 import os
-import pathlib
 import shutil
 import signal
 import subprocess
@@ -11,8 +10,9 @@ import sys
 
 import numpy as np
 
-from e2e import (LIMIT_S, Case, draw_pictures, give_bodies, make_network, prima_dataset, program, read_safetensors,
-                 run, split_safetensors, started, wait_until, write_annotations, write_json, write_safetensors)
+from e2e import (LIMIT_S, Case, draw_pictures, give_bodies, make_network, prima_dataset, program, ranks_of,
+                 read_safetensors, run, split_safetensors, started, wait_until, write_annotations, write_json,
+                 write_safetensors)
 
 STEPS = 3
 
@@ -122,10 +122,21 @@ class Ranks(Case):
         log = self.folder / "long/log.jsonl"
         with started(*self.train("long", "--ranks", 2, config=config)) as launcher:
             wait_until(lambda: log.exists() and log.stat().st_size > 0 or launcher.process.poll() is not None, "a step")
-            os.kill(self.rank(launcher.pid, 1), signal.SIGKILL)
+            os.kill(ranks_of(launcher.pid)[1], signal.SIGKILL)
             self.assertEqual(launcher.wait(), 1, launcher.stderr())
             self.assertIn("rank 1 of 2 was ended by signal 9", launcher.stderr())
             self.assertIn("rank 0 of 2: working with the other ranks failed", launcher.stderr())
+
+    def test_a_rank_that_hangs_is_ended_when_another_is_gone(self):
+        config = self.write_config("long", stages={"1": [{"name": "long", "pools": ["truth"], "steps": 100000}]})
+        log = self.folder / "long/log.jsonl"
+        with started(*self.train("long", "--ranks", 2, config=config)) as launcher:
+            wait_until(lambda: log.exists() and log.stat().st_size > 0 or launcher.process.poll() is not None, "a step")
+            ranks = ranks_of(launcher.pid)
+            os.kill(ranks[0], signal.SIGSTOP)
+            os.kill(ranks[1], signal.SIGKILL)
+            launcher.wait_for_line("the other ranks have 30 s to finish what they are at")
+            self.assertEqual(launcher.wait(), 128 + signal.SIGKILL, launcher.stderr())
 
     def test_stopped_and_resumed_the_weights_are_the_same_to_the_bit(self):
         config = self.write_config("dropout", initial="with_dropout.safetensors")
@@ -153,7 +164,7 @@ class Ranks(Case):
         """To one rank alone; and to the launcher, as Ctrl-C does, which passes it on to every rank."""
         steps = [{"name": "long", "pools": ["truth"], "steps": 100000}]
         config = self.write_config("long", stages={"1": steps})
-        self.assertGreaterEqual(self.steps_before_signal("long", config, lambda launcher: self.rank(launcher, 1)), 2)
+        self.assertGreaterEqual(self.steps_before_signal("long", config, lambda launcher: ranks_of(launcher)[1]), 2)
         saved = (self.folder / "long/state.safetensors").read_bytes()
         self.assertGreaterEqual(self.steps_before_signal("long", config, lambda launcher: launcher), 4)
         self.assertNotEqual(saved, (self.folder / "long/state.safetensors").read_bytes())
@@ -186,11 +197,3 @@ class Ranks(Case):
         process.terminate()
         process.wait(LIMIT_S)
         process.stderr.close()
-
-    @staticmethod
-    def rank(launcher, number):
-        """The process id of a rank."""
-        children = pathlib.Path(f"/proc/{launcher}/task/{launcher}/children").read_text().split()
-        return next(int(child) for child in children if
-                    pathlib.Path(f"/proc/{child}/cmdline").read_bytes().startswith(program().encode()) and
-                    f"\0RANK={number}\0".encode() in pathlib.Path(f"/proc/{child}/environ").read_bytes())

@@ -5,22 +5,14 @@ import signal
 import subprocess
 import sys
 
-from e2e import (LIMIT_S, Fault, Rank, Scene, SceneCase, command, digests, environment, launcher_store, own_store,
+from e2e import (LIMIT_S, Fault, Rank, SmallUnitsCase, build_digests, command, environment, launcher_store, own_store,
                  prima_dataset, run, wait_until)
 
 # Rank 0 syncs two files of the stage's folder when it opens it; then it syncs its first shard.
 FIRST_SHARD_OF_RANK_0 = 2
 
 
-class SharedBuild(SceneCase):
-    @classmethod
-    def prepare(cls):
-        Scene.make(cls.shared).build_in_small_units("one")
-
-    def setUp(self):
-        super().setUp()
-        self.config = self.shared / "fine.json"
-
+class SharedBuild(SmallUnitsCase):
     def words(self, out, *more, config=None):
         return self.scene.build_words(out, *more, config=config or self.config)
 
@@ -42,14 +34,6 @@ class SharedBuild(SceneCase):
     def wait_all(self, ranks, expect=0):
         codes = [rank.wait() for rank in ranks]
         self.assertEqual(codes, [expect] * len(ranks), "\n".join(rank.stderr() for rank in ranks))
-
-    def files(self, out):
-        """Every file below folder/out with its digest, without the caches and the plan, which hold paths or times."""
-        return {name: digest for name, digest in digests(out).items()
-                if not name.startswith("stages/builds/") and name not in (".lock", "digests.txt")}
-
-    def assert_equals_one(self, out):
-        self.assertEqual(self.files(self.folder / out), self.files(self.shared / "one"))
 
     def shards_of_others(self, out):
         """How many shards ranks other than 0 have made, as their own journals say."""
@@ -96,14 +80,14 @@ class SharedBuild(SceneCase):
         self.wait_all(self.start_all(words, 2))
         run("calibrate", "--config", self.config, "--out", self.folder / "alone", "--write", self.folder / "one.json")
         self.assertEqual((self.folder / "two.json").read_text(), (self.folder / "one.json").read_text())
-        self.assertEqual(self.files(self.folder / "pool"), self.files(self.folder / "alone"))
+        self.assertEqual(build_digests(self.folder / "pool"), build_digests(self.folder / "alone"))
 
     def test_a_build_without_a_network_is_shared_too(self):
         config = self.scene.write_config("plain.json", datasets=[prima_dataset(self.scene.data, role="2d_only")],
                                          shards={"unit_size": 3})
         run("build", "--config", config, "--out", self.folder / "alone")
         self.wait_all(self.start_all(["build", "--config", config, "--out", self.folder / "shared"], 3))
-        self.assertEqual(self.files(self.folder / "shared"), self.files(self.folder / "alone"))
+        self.assertEqual(build_digests(self.folder / "shared"), build_digests(self.folder / "alone"))
 
     def start_stopped(self, fault):
         """Two ranks that have stopped themselves: the first before its first shard, the second at the fault."""

@@ -9,8 +9,8 @@ import tempfile
 import time
 import unittest
 
-from e2e import (LIMIT_S, Fault, Scene, SceneCase, digests, draw_pictures, environment, give_bodies, make_network,
-                 prima_dataset, program, run, wait_until, write_annotations, write_json)
+from e2e import (LIMIT_S, Fault, SmallUnitsCase, draw_pictures, environment, give_bodies, make_network, prima_dataset,
+                 program, run, wait_until, write_annotations, write_json)
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 NEEDED = ("munged", "slurmctld", "slurmd", "srun", "sbatch", "scontrol", "squeue", "scancel")
@@ -111,11 +111,7 @@ class Cluster:
 @unittest.skipUnless(all(shutil.which(name) for name in NEEDED),
                      "Slurm is not installed; apt-get install slurmctld slurmd slurm-client munge")
 @unittest.skipUnless(os.geteuid() == 0, "slurmd starts tasks as their user, for which it must be root")
-class Slurm(SceneCase):
-    @classmethod
-    def prepare(cls):
-        Scene.make(cls.shared).build_in_small_units("one")
-
+class Slurm(SmallUnitsCase):
     def setUp(self):
         super().setUp()
         self.cluster = Cluster()
@@ -171,20 +167,16 @@ class Slurm(SceneCase):
         self.wait_for(job, "COMPLETED")
         self.assertEqual(self.cluster.restarts(job), 1)
 
-    def files(self, out):
-        return {name: digest for name, digest in digests(out).items()
-                if not name.startswith("stages/builds/") and name not in (".lock", "digests.txt")}
-
     def test_two_tasks_build_the_bytes_of_one_process(self):
-        words = self.scene.build_words("out", config=self.shared / "fine.json")[1:]
+        words = self.scene.build_words("out", config=self.config)[1:]
         self.wait_for(self.submit("build.sbatch", *words), "COMPLETED")
-        self.assertEqual(self.files(self.folder / "out"), self.files(self.shared / "one"))
+        self.assert_equals_one()
 
     def test_a_build_that_is_preempted_is_queued_again_and_completes(self):
-        words = self.scene.build_words("out", config=self.shared / "fine.json")[1:]
+        words = self.scene.build_words("out", config=self.config)[1:]
         script = self.program_that(Fault("shards-", "sync", "hang", skip=4))
         self.preempt_and_complete(self.submit("build.sbatch", *words, quadruped3d=script))
-        self.assertEqual(self.files(self.folder / "out"), self.files(self.shared / "one"))
+        self.assert_equals_one()
 
     def test_a_training_that_is_preempted_goes_on_from_its_state(self):
         folder = self.folder

@@ -102,6 +102,10 @@ class SharedEvaluation(Case):
             self.assert_as_alone()
             shutil.rmtree(self.out)
 
+    def test_ranks_that_the_program_starts_itself_write_the_files_of_one_process(self):
+        self.assertIn("samples.csv", run(*self.words(self.config, self.out, "--ranks", 2)).stdout)
+        self.assert_as_alone()
+
     def start_stopped(self, variables):
         """Two ranks that have stopped, each with a unit open. The launcher holds the store, since rank 0 stops too."""
         faults = {rank: Fault("unit-", "rename", "stop") for rank in range(2)}

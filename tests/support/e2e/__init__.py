@@ -15,12 +15,12 @@ __main__.py, which also tells it where the program is. The parts:
 
 from . import pages
 from .case import Case
-from .datasets import (copy_folder, digests, file_sha256, flip_bit, journal_lines, kept, latest, read_byte_column,
+from .datasets import (build_digests, copy_folder, digests, file_sha256, flip_bit, journal_lines, kept, latest, read_byte_column,
                        read_csv, read_safetensors, read_samples, seal_json, split_safetensors, stamps,
                        units_in_journals, verdicts, write_safetensors)
 from .pictures import (FOCAL, draw_pictures, give_bodies, make_network, prima_dataset, render_world, smooth_picture,
                        world_animal3d, world_body, world_superanimal, write_annotations, write_json)
 from .program import (LIMIT_S, Fault, Started, alarm_seconds, command, environment, fault_lines, kill_and_resume, program,
                       run, run_json, started, wait_until)
-from .ranks import Rank, launcher_store, own_store
-from .scene import PICTURES, UNIT, DrawnCase, Scene, SceneCase
+from .ranks import Rank, launcher_store, own_store, ranks_of
+from .scene import PICTURES, UNIT, DrawnCase, Scene, SceneCase, SmallUnitsCase

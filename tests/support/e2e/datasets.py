@@ -41,6 +41,12 @@ def digests(folder):
     return {str(p.relative_to(folder)): file_sha256(p) for p in sorted(folder.rglob("*")) if p.is_file()}
 
 
+def build_digests(out):
+    """digests() of a build's output folder, without the caches and the plan, which hold paths or times."""
+    return {name: digest for name, digest in digests(out).items()
+            if not name.startswith("stages/builds/") and name not in (".lock", "digests.txt")}
+
+
 def stamps(paths):
     """Inode and time of change of every file: they are equal only if nobody wrote the file again."""
     return {path: (path.stat().st_ino, path.stat().st_mtime_ns) for path in paths}

@@ -1,7 +1,9 @@
 """Starts the program as ranks that share a build, as torchrun or srun starts it."""
 
+import contextlib
 import datetime
 import json
+import pathlib
 import socket
 import subprocess
 
@@ -27,6 +29,17 @@ def launcher_store():
     store = TCPStore("127.0.0.1", 0, is_master=True, wait_for_workers=False,
                      timeout=datetime.timedelta(seconds=LIMIT_S))
     return store, {"MASTER_PORT": str(store.port), "TORCHELASTIC_USE_AGENT_STORE": "True"}
+
+
+def ranks_of(launcher):
+    """{rank: process id} of the processes that a launcher has started."""
+    found = {}
+    for child in pathlib.Path(f"/proc/{launcher}/task/{launcher}/children").read_text().split():
+        with contextlib.suppress(FileNotFoundError, ProcessLookupError):  # it has ended meanwhile
+            variables = pathlib.Path(f"/proc/{child}/environ").read_bytes().split(b"\0")
+            found.update({int(variable[len(b"RANK="):]): int(child) for variable in variables
+                          if variable.startswith(b"RANK=")})
+    return found
 
 
 class Rank:

@@ -3,7 +3,7 @@
 import json
 
 from .case import Case
-from .datasets import latest
+from .datasets import build_digests, latest
 from .pictures import draw_pictures, make_network, prima_dataset, write_annotations, write_json
 from .program import run
 
@@ -92,6 +92,21 @@ class SceneCase(Case):
     def setUp(self):
         super().setUp()
         self.scene = Scene(self.shared, self.folder)
+
+
+class SmallUnitsCase(SceneCase):
+    """Tests that share a scene, and compare a build in small units with what one process has made in shared/one."""
+
+    @classmethod
+    def prepare(cls):
+        Scene.make(cls.shared).build_in_small_units("one")
+
+    def setUp(self):
+        super().setUp()
+        self.config = self.shared / "fine.json"
+
+    def assert_equals_one(self, out="out"):
+        self.assertEqual(build_digests(self.folder / out), build_digests(self.shared / "one"))
 
 
 class DrawnCase(Case):
