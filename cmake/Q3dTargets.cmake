@@ -104,11 +104,12 @@ function(q3d_room)
   file(APPEND "${PROJECT_BINARY_DIR}/rooms.tsv" "${folder}\t${rooms}\t${ARG_TORCH}\t${ARG_JOB}\n")
 endfunction()
 
+# Seconds after which a test counts as hung. Sanitizers make some tests ten times slower.
+set(Q3D_TEST_TIMEOUT 3600)
+
 # q3d_test(NAME SOURCES ... LIBS ... [LABEL label] [TORCH]): one GoogleTest binary. Each of its test cases is a ctest
 # entry, NAME.Suite.Case. A binary that loads LibTorch takes half a second to start, so with TORCH each suite is an
 # entry instead, NAME.Suite.
-# TIMEOUT only ends a test that hangs; sanitizers make some ten times slower.
-set(Q3D_TEST_TIMEOUT 3600)
 include(GoogleTest)
 function(q3d_test name)
   cmake_parse_arguments(ARG "TORCH" "LABEL" "SOURCES;LIBS" ${ARGN})

@@ -13,8 +13,8 @@
 
 namespace q3d::pipeline::cli {
 
-// What the ranks of a command do: nothing, since it has no --ranks; units, which others make again if a rank
-// is lost; or steps, for which every rank is needed.
+// A command without --ranks has none. The ranks of others either share units, so that a lost rank's units are
+// made by the others, or take every step together, so that all are needed to the end.
 enum class RankWork : std::uint8_t { none, units, steps };
 
 struct CommandInfo {

@@ -1,4 +1,4 @@
-// What can be seen of NCCL without a GPU: it is there, is not chosen, and says what it lacks.
+// Without a GPU, these tests see only that NCCL is built in, is not chosen, and says that it lacks a GPU.
 #include "model/ranks/nccl_group.h"
 
 #include <gmock/gmock.h>
