@@ -22,7 +22,7 @@ FAULTS ?= 25 --jobs labels
 quadruped3d: program  ## build the dataset that CONFIG describes (default: the rendered sample world)
 	tools/quadruped3d.sh $(OUT) $(CONFIG)
 
-sample-model: program  ## train the default network on the rendered world (pre-training and Stage 1)
+sample-model: program  ## train the network that ships on rendered worlds (pre-training, Stage 1, two longer trainings)
 	tools/sample_loop.sh model
 
 sample-loop: program  ## Stage 1, Stage 2, Stage 3 and their tables (SCHEDULE=full or quick, SEED=0)

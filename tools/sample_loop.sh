@@ -1,10 +1,15 @@
 #!/usr/bin/env bash
 # Trainings on the rendered world:
-#   tools/sample_loop.sh model                how models/lite.safetensors was made: pre-trained encoders, Stage 1, and a
-#                                             longer training with the pictures of a second world
+#   tools/sample_loop.sh model                how models/lite.safetensors was made: pre-trained encoders, Stage 1, and
+#                                             two longer trainings with the pictures of further worlds
 #   tools/sample_loop.sh loop SCHEDULE SEED   the paper's loop: Stage 1, Stage 2, Stage 3, and both networks on the test
 #                                             sets. Both stages train a fresh head on the encoders of
 #                                             models/lite.safetensors
+#   tools/sample_loop.sh control SCHEDULE SEED
+#                                             after `loop`: Stage 1 with SuperAnimal's pictures drawn as often as Stage 3
+#                                             draws its labels, so that what is left of the gain is due to the labels
+#   tools/sample_loop.sh ablations SCHEDULE SEED
+#                                             after `loop`: Stage 1 without one component each
 # SCHEDULE is full or quick. Every step does what is missing, so a run that was stopped goes on where it was.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -48,12 +53,26 @@ pretrain() {
   train --config configs/world_training.json --set frozen_stem_blocks=11 --stage pretrain --out "$home/pretrain"
 }
 
+# Another world for training alone, and its pools.
+another_world() {
+  local name=$1 seed=$2 share=$3
+  say "the $name world and its training pools"
+  [ -f "data/${name}_world/world.json" ] ||
+    "$program" sample --seed "$seed" --share "$share" --out "data/${name}_world"
+  pools "${name}_animal3d" "${name}_ctrlani3d" "${name}_superanimal"
+}
+
 longer() {
-  say "a second world and its training pools"
-  [ -f data/more_world/world.json ] || "$program" sample --seed 101 --share 2 --out data/more_world
-  pools more_animal3d more_ctrlani3d more_superanimal
+  another_world more 101 2
   say "a longer training of the whole network"
   train --config configs/world_training.json --config configs/world_longer.json --stage longer --out "$home/longer"
+}
+
+longest() {
+  another_world third 102 4
+  say "a still longer training"
+  train --config configs/world_training.json --config configs/world_longer.json --config configs/world_longest.json \
+    --stage longest --out "$home/longest"
 }
 
 # The training config's layers for a schedule, a seed and a checkpoint whose encoders all stages start from. Stage 3
@@ -108,20 +127,52 @@ loop() {
   "$program" compare --before "$run/evaluation1" --after "$run/evaluation3" --out "$run/comparison.json"
 }
 
+control() {
+  local schedule=$1 seed=$2
+  local run=$home/$schedule-$seed
+  say "Stage 1 with more of SuperAnimal's 2D annotations"
+  # shellcheck disable=SC2046
+  train $(layers "$schedule" "$seed" "$run" "$shipped") --set pools.superanimal.weight=0.5 --stage 1 \
+    --out "$run/control"
+  evaluate "$run/control" "$run/evaluation_control"
+  say "what more 2D annotations changed"
+  "$program" compare --before "$run/evaluation1" --after "$run/evaluation_control"
+  say "what the labels in their place changed"
+  "$program" compare --before "$run/evaluation_control" --after "$run/evaluation3"
+}
+
+ablations() {
+  local schedule=$1 seed=$2
+  local run=$home/$schedule-$seed part
+  for part in keypoint_tokens bio_features initial_betas; do
+    say "Stage 1 without $part"
+    # shellcheck disable=SC2046
+    train $(layers "$schedule" "$seed" "$run" "$shipped") --set "network.without=[\"$part\"]" --stage 1 \
+      --out "$run/without_$part"
+    evaluate "$run/without_$part" "$run/evaluation_without_$part"
+    say "what $part changes"
+    "$program" compare --before "$run/evaluation_without_$part" --after "$run/evaluation1"
+  done
+}
+
 case "${1:-}" in
   model)
     prepare
     pretrain
     stage1 full 0 "$home/model" "$home/pretrain/model.safetensors"
     longer
-    say "trained: $home/longer/model.safetensors ($shipped is such a network)"
+    longest
+    say "trained: $home/longest/model.safetensors ($shipped is such a network)"
     ;;
   loop)
     prepare
     loop "${2:-full}" "${3:-0}"
     ;;
+  control | ablations)
+    "$1" "${2:-full}" "${3:-0}"
+    ;;
   *)
-    echo "usage: tools/sample_loop.sh model | loop [full|quick] [SEED]" >&2
+    echo "usage: tools/sample_loop.sh model | loop|control|ablations [full|quick] [SEED]" >&2
     exit 2
     ;;
 esac
