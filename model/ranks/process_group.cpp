@@ -38,11 +38,19 @@ auto together(const RankPlace& place, Call&& call) {
   }
 }
 
-// The search for parameters that no loss reaches, which networks without keypoint tokens have, warns when
-// there are none.
-class NoWarnings : public c10::WarningHandler {
+// Keeps two of the reducer's warnings from users, for whom they mean nothing. It searches for parameters that
+// no loss reaches, which networks without keypoint tokens have, and warns when there are none. And it warns
+// when the strides of a gradient of a 1x1 convolution, which oneDNN computes, differ from the weight's; the
+// order in memory is the same.
+class ReducerWarnings : public c10::WarningHandler {
  public:
-  void process(const c10::Warning&) override {}
+  void process(const c10::Warning& warning) override {
+    for (const char* known :
+         {"find_unused_parameters=True was specified", "Grad strides do not match bucket view strides"}) {
+      if (warning.msg().find(known) != std::string::npos) return;
+    }
+    c10::WarningHandler::process(warning);
+  }
 };
 
 class ReducedBackward : public AveragedBackward {
@@ -64,11 +72,9 @@ class ReducedBackward : public AveragedBackward {
 
   void run(const torch::Tensor& loss) override {
     together(place_, [&] {
-      {
-        NoWarnings none;
-        const c10::WarningUtils::WarningHandlerGuard guard(&none);
-        reducer_->prepare_for_backward({loss});
-      }
+      ReducerWarnings warnings;
+      const c10::WarningUtils::WarningHandlerGuard guard(&warnings);
+      reducer_->prepare_for_backward({loss});
       loss.backward();
     });
   }
