@@ -43,7 +43,13 @@ torch::Tensor projected_keypoints(const smal::tensors::SmalBody& body, const Dec
 
 Prediction assemble(const PrimaNet& net, const smal::tensors::SmalBody& body, const DecoderOutput& output,
                     const torch::Tensor& initial_betas, bool with_vertices) {
-  const double focal_px = net.config().focal_px;
+  Prediction prediction = assemble_body(body, output, initial_betas, net.config().focal_px, with_vertices);
+  prediction.shape_feature = net.decoder().shape_feature(initial_betas);
+  return prediction;
+}
+
+Prediction assemble_body(const smal::tensors::SmalBody& body, const DecoderOutput& output,
+                         const torch::Tensor& initial_betas, double focal_px, bool with_vertices) {
   Prediction prediction;
   prediction.rotations = pose_rotations(output.pose_6d);
   prediction.betas = output.betas;
@@ -57,7 +63,6 @@ Prediction assemble(const PrimaNet& net, const smal::tensors::SmalBody& body, co
   prediction.aux_keypoints_2d = output.aux_keypoints_2d;
   prediction.aux_keypoints_3d = output.aux_keypoints_3d;
   prediction.init_betas = initial_betas;
-  prediction.shape_feature = net.decoder().shape_feature(initial_betas);
   return prediction;
 }
 

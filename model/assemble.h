@@ -24,5 +24,8 @@ torch::Tensor projected_keypoints(const smal::tensors::SmalBody& body, const Dec
 // Returns the prediction of the decoder's output. initial_betas: (B, 41). Differentiable.
 Prediction assemble(const PrimaNet& net, const smal::tensors::SmalBody& body, const DecoderOutput& output,
                     const torch::Tensor& initial_betas, bool with_vertices);
+// The same without the shape_feature, the one number that needs weights of the network.
+Prediction assemble_body(const smal::tensors::SmalBody& body, const DecoderOutput& output,
+                         const torch::Tensor& initial_betas, double focal_px, bool with_vertices);
 
 }  // namespace q3d::model

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "model/batch_in_parts.h"
 #include "model/decoder.h"
 #include "model/init.h"
 #include "model/mixed_precision.h"
@@ -101,13 +102,13 @@ EncoderTrainer::EncoderTrainer(std::shared_ptr<PrimaNet> net, const EncoderTrain
   backward_ = ranks_->averaged_backward(optimiser_.parameters());
 }
 
-EncoderTrainer::Outputs EncoderTrainer::predict(const torch::Tensor& images) const {
+std::vector<torch::Tensor> EncoderTrainer::pass(const torch::Tensor& images) const {
   const MixedPrecision mixed(images.device(), options_.precision == Precision::bfloat16);
   const torch::Tensor tokens = net_->image_tokens(images);
-  const Outputs outputs{heads_->keypoints->forward(tokens), heads_->backbone->forward(tokens.mean(1)),
-                        heads_->bioclip->forward(net_->bioclip().features(images))};
-  return {outputs.keypoint_logits.to(torch::kFloat32), outputs.backbone_species.to(torch::kFloat32),
-          outputs.bioclip_species.to(torch::kFloat32)};
+  const torch::Tensor keypoints = heads_->keypoints->forward(tokens);
+  const torch::Tensor backbone = heads_->backbone->forward(tokens.mean(1));
+  const torch::Tensor bioclip = heads_->bioclip->forward(net_->bioclip().features(images));
+  return {keypoints.to(torch::kFloat32), backbone.to(torch::kFloat32), bioclip.to(torch::kFloat32)};
 }
 
 StepReport EncoderTrainer::step(const TrainingBatch& batch) {
@@ -117,16 +118,20 @@ StepReport EncoderTrainer::step(const TrainingBatch& batch) {
     throw std::invalid_argument("encoder trainer: a species number beyond the list");
   }
   optimiser_.zero_grad();
-  const Outputs outputs = predict(batch.images.to(device));
+  BatchInParts parts([this](const torch::Tensor& images) { return pass(images); }, batch.images.to(device),
+                     options_.parts);
+  const torch::Tensor& keypoint_logits = parts.outputs()[0];
+  const torch::Tensor& backbone_species = parts.outputs()[1];
+  const torch::Tensor& bioclip_species = parts.outputs()[2];
   PartialMean keypoints =
-      keypoint_loss(outputs.keypoint_logits, token_targets(batch.targets.keypoints_2d.to(device)));
-  PartialMean backbone = species_loss(outputs.backbone_species, species);
-  PartialMean bioclip = species_loss(outputs.bioclip_species, species);
-  PartialMean backbone_accuracy = accuracy(outputs.backbone_species, species);
-  PartialMean bioclip_accuracy = accuracy(outputs.bioclip_species, species);
+      keypoint_loss(keypoint_logits, token_targets(batch.targets.keypoints_2d.to(device)));
+  PartialMean backbone = species_loss(backbone_species, species);
+  PartialMean bioclip = species_loss(bioclip_species, species);
+  PartialMean backbone_accuracy = accuracy(backbone_species, species);
+  PartialMean bioclip_accuracy = accuracy(bioclip_species, species);
   join_means({&keypoints, &backbone, &bioclip, &backbone_accuracy, &bioclip_accuracy}, *ranks_);
   const torch::Tensor loss = keypoints.value() + backbone.value() + bioclip.value();
-  backward_->run(loss);
+  parts.backward(loss, *backward_);
   const torch::Tensor norm = optimiser_.gradient_norm();
   const std::vector<double> values = ranks::mean_over_ranks(
       *ranks_, to_host({loss, norm, keypoints.value(), backbone.value(), bioclip.value(),

@@ -22,6 +22,7 @@ struct EncoderTrainerOptions {
   StemTraining stem;
   double largest_gradient_norm = 0.0;  // longer gradients are scaled down to it; 0 = never
   Precision precision = Precision::float32;
+  int parts = 1;             // of a batch, computed one after the other (BatchInParts)
   std::int64_t species = 0;  // number of names
   std::uint64_t seed = 0;    // of the heads' weights
 };
@@ -48,12 +49,9 @@ class EncoderTrainer : public Learner {
 
  private:
   class Heads;
-  struct Outputs {
-    torch::Tensor keypoint_logits;   // (B, 192, 26)
-    torch::Tensor backbone_species;  // (B, species)
-    torch::Tensor bioclip_species;   // (B, species)
-  };
-  Outputs predict(const torch::Tensor& images) const;
+  // Returns logits: of the keypoints (B, 192, 26), of the species by the backbone and by the BioCLIP encoder
+  // (B, species).
+  std::vector<torch::Tensor> pass(const torch::Tensor& images) const;
 
   std::shared_ptr<PrimaNet> net_;
   EncoderTrainerOptions options_;

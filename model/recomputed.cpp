@@ -5,9 +5,9 @@
 #include <torch/csrc/autograd/custom_function.h>
 #include <torch/custom_class.h>
 
-#include <mutex>
 #include <utility>
 
+#include "model/draws.h"
 #include "model/mixed_precision.h"
 
 namespace q3d::model {
@@ -16,50 +16,20 @@ namespace {
 using torch::autograd::AutogradContext;
 using torch::autograd::variable_list;
 
-at::Generator generator_of(torch::Device device) {
-  return at::globalContext().defaultGenerator(device);
-}
-
-torch::Tensor state_of(at::Generator generator) {
-  const std::lock_guard lock(generator.mutex());
-  return generator.get_state();
-}
-
-void set_state(at::Generator generator, const torch::Tensor& state) {
-  const std::lock_guard lock(generator.mutex());
-  generator.set_state(state);
-}
-
 // A call of a part, and what besides its input decides its result.
 struct Call : torch::CustomClassHolder {
   Call(NetworkPart called, std::vector<torch::Tensor> uses, torch::Device on)
       : part(std::move(called)),
         parameters(std::move(uses)),
         device(on),
-        draws(state_of(generator_of(on))),
+        draws(on),
         is_mixed(at::autocast::is_autocast_enabled(on.type())) {}
 
   NetworkPart part;
   std::vector<torch::Tensor> parameters;
   torch::Device device;
-  torch::Tensor draws;  // state of the generator
-  bool is_mixed;        // see MixedPrecision
-};
-
-// Lets the generator draw for one scope what it drew in a call.
-class DrawsOfCall {
- public:
-  explicit DrawsOfCall(const Call& call)
-      : generator_(generator_of(call.device)), present_(state_of(generator_)) {
-    set_state(generator_, call.draws);
-  }
-  ~DrawsOfCall() { set_state(generator_, present_); }
-  DrawsOfCall(const DrawsOfCall&) = delete;
-  DrawsOfCall& operator=(const DrawsOfCall&) = delete;
-
- private:
-  at::Generator generator_;
-  torch::Tensor present_;
+  Draws draws;    // before the call
+  bool is_mixed;  // see MixedPrecision
 };
 
 // The parameters are inputs of the function too, so that a search of the graph finds them (c10d's Reducer
@@ -83,7 +53,7 @@ struct Recomputed : torch::autograd::Function<Recomputed> {
     const at::AutoGradMode with_gradients(true);
     torch::Tensor output;
     {
-      const DrawsOfCall draws(*call);
+      const RepeatedDraws draws(call->draws);
       const MixedPrecision mixed(call->device, call->is_mixed);
       output = call->part(input);
     }

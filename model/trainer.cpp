@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "model/assemble.h"
+#include "model/batch_in_parts.h"
 #include "model/mixed_precision.h"
 #include "model/module_state.h"
 #include "smal/camera.h"
@@ -91,21 +92,32 @@ Trainer::Trainer(std::shared_ptr<PrimaNet> net, smal::tensors::SmalBody body, Pr
   discriminator_backward_ = ranks_->averaged_backward(discriminator_optimiser_->parameters());
 }
 
-Prediction Trainer::predict(const torch::Tensor& images) const {
+// Returns the fields of the decoder's output in their order, initial betas and shape features.
+std::vector<torch::Tensor> Trainer::pass(const torch::Tensor& images) const {
   torch::Tensor initial_betas;
   DecoderOutput output;
+  const Decoder& decoder = net_->decoder();
   {
     const MixedPrecision mixed(body_.device(), options_.precision == Precision::bfloat16);
     const ImageFeatures features = net_->encode(images);
-    const Decoder& decoder = net_->decoder();
     initial_betas = decoder.initial_betas(features.bio_token).to(torch::kFloat32);
     output = decoder.refine(decoder.remember(features.image_tokens), initial_betas, decoder.own_parameters());
   }
-  for (torch::Tensor* tensor :
-       {&output.pose_6d, &output.betas, &output.camera, &output.aux_keypoints_2d, &output.aux_keypoints_3d}) {
-    *tensor = tensor->to(torch::kFloat32);
-  }
-  return assemble(*net_, body_, output, initial_betas, /*with_vertices=*/false);
+  std::vector<torch::Tensor> outputs{output.pose_6d, output.betas, output.camera, output.aux_keypoints_2d,
+                                     output.aux_keypoints_3d};
+  for (torch::Tensor& tensor : outputs) tensor = tensor.to(torch::kFloat32);
+  outputs.push_back(initial_betas);
+  outputs.push_back(decoder.shape_feature(initial_betas));
+  return outputs;
+}
+
+// Returns the bodies of what pass() returns.
+Prediction Trainer::predicted(const std::vector<torch::Tensor>& outputs) const {
+  const DecoderOutput output{outputs[0], outputs[1], outputs[2], outputs[3], outputs[4]};
+  Prediction prediction =
+      assemble_body(body_, output, outputs[5], net_->config().focal_px, /*with_vertices=*/false);
+  prediction.shape_feature = outputs[6];
+  return prediction;
 }
 
 StepReport Trainer::step(const TrainingBatch& batch) {
@@ -113,7 +125,9 @@ StepReport Trainer::step(const TrainingBatch& batch) {
   const Targets targets = to_device(batch.targets, body_.device());
   optimiser_.zero_grad();
 
-  const Prediction prediction = predict(batch.images.to(body_.device()));
+  BatchInParts parts([this](const torch::Tensor& images) { return pass(images); },
+                     batch.images.to(body_.device()), options_.parts);
+  const Prediction prediction = predicted(parts.outputs());
   const LossTerms terms = loss_terms(prediction, targets, priors_, options_.variant, *ranks_);
   torch::Tensor loss = total_loss(terms, options_.weights);
   auto named = named_terms(terms);
@@ -123,7 +137,7 @@ StepReport Trainer::step(const TrainingBatch& batch) {
     loss = loss + options_.weights.adversarial * adversarial;
     named.emplace_back("adversarial", adversarial);
   }
-  backward_->run(loss);
+  parts.backward(loss, *backward_);
   const torch::Tensor norm = optimiser_.gradient_norm();
 
   std::vector<torch::Tensor> scalars{loss, norm};

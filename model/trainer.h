@@ -27,6 +27,7 @@ struct TrainerOptions {
   RateSchedule schedule;
   double largest_gradient_norm = 0.0;  // longer gradients are scaled down to it; 0 = never
   Precision precision = Precision::float32;
+  int parts = 1;             // of a batch, computed one after the other (BatchInParts)
   bool adversarial = false;  // train a discriminator along; the paper does so in the warm-up
   std::uint64_t seed = 0;    // of the discriminator's weights
 };
@@ -50,7 +51,8 @@ class Trainer : public Learner {
   void restore(const smal::tensors::SafeTensors& file) override;
 
  private:
-  Prediction predict(const torch::Tensor& images) const;
+  std::vector<torch::Tensor> pass(const torch::Tensor& images) const;
+  Prediction predicted(const std::vector<torch::Tensor>& outputs) const;
   torch::Tensor step_discriminator(const Prediction& prediction, const Targets& targets,
                                    double learning_rate);
 

@@ -133,6 +133,7 @@ model::TrainerOptions trainer_options(const TrainingConfig& config, const PhaseC
   options.largest_gradient_norm = config.largest_gradient_norm;
   options.precision = config.network.precision == Precision::bfloat16 ? model::Precision::bfloat16
                                                                       : model::Precision::float32;
+  options.parts = config.batch_parts;
   options.adversarial = phase.adversarial;
   options.seed = config.seed;
   return options;
@@ -147,6 +148,7 @@ model::EncoderTrainerOptions encoder_options(const TrainingConfig& config, const
   options.stem = common.stem;
   options.largest_gradient_norm = common.largest_gradient_norm;
   options.precision = common.precision;
+  options.parts = common.parts;
   options.species = static_cast<std::int64_t>(species);
   options.seed = config.seed;
   return options;
@@ -178,6 +180,12 @@ feed::Feed open_feed(const TrainingConfig& config, const PhaseConfig& phase, int
   options.threads = threads;
   options.rank = ranks.rank();
   options.ranks = ranks.size();
+  const int own_samples = options.batch / ranks.size();
+  if (config.batch_parts > own_samples) {
+    throw run::ConfigError(
+        fmt::format("batch_parts: got {}, expected at most {}, the samples of a batch on one rank",
+                    config.batch_parts, own_samples));
+  }
   try {
     // Each phase draws from its own random stream.
     return {std::move(pools), weights, options, phase_seed(config, phase_index)};

@@ -186,6 +186,31 @@ TEST_F(TrainerTest, Bfloat16IsCloseAndLeavesFloat32Weights) {
   EXPECT_NE(learner.step(batch).loss, half.loss);
 }
 
+// The losses couple the samples: priors are means over those without truth, shape features are compared.
+TEST_F(TrainerTest, PartsOfABatchHaveTheGradientsOfTheWhole) {
+  PrimaConfig still = small_config();
+  still.dropout = still.drop_path = 0.0;
+  TrainerOptions in_parts = quick();
+  in_parts.parts = 2;
+  const TrainingBatch batch = seeded_batch(body_, 6);
+  Trainer whole = trainer(quick(), still);
+  Trainer parts = trainer(in_parts, still);
+  const StepReport a = whole.step(batch), b = parts.step(batch);
+  ASSERT_TRUE(b.applied);
+  ASSERT_EQ(a.terms.size(), b.terms.size());
+  for (std::size_t i = 0; i < a.terms.size(); ++i)
+    EXPECT_NEAR(a.terms[i].second, b.terms[i].second, 1e-5 + 1e-4 * std::abs(a.terms[i].second))
+        << a.terms[i].first;
+  for (const auto& parameter : whole.net().named_parameters()) {
+    const torch::Tensor& gradient = parameter.value().grad();
+    const torch::Tensor& other = parts.net().named_parameters().find(parameter.key())->grad();
+    ASSERT_EQ(gradient.defined(), other.defined()) << parameter.key();
+    if (!gradient.defined()) continue;
+    const double apart = (gradient - other).norm().item<double>();
+    EXPECT_LT(apart, 1e-3 * gradient.norm().item<double>() + 1e-4 * a.gradient_norm) << parameter.key();
+  }
+}
+
 TEST_F(TrainerTest, ClippingBoundsTheGradientNotTheReport) {
   TrainerOptions options = quick();
   options.largest_gradient_norm = 1e-3;

@@ -81,25 +81,35 @@ class Ranks(Case):
         self.assertEqual(result.returncode == 0, expect == 0, result.stderr)
         return result
 
+    def logged(self, out):
+        return [json.loads(line) for line in (self.folder / out / "log.jsonl").read_text().splitlines()]
+
+    def assert_trained_alike(self, one, other):
+        """The first steps agree up to rounding, and so do the weights in the end."""
+        first, second = self.logged(one)[0], self.logged(other)[0]
+        for name, value in first["terms"].items():
+            np.testing.assert_allclose(second["terms"][name], value, rtol=1e-4, atol=1e-7, err_msg=name)
+        np.testing.assert_allclose(second["gradient_norm"], first["gradient_norm"], rtol=1e-4)
+        # AdamW moves an element whose gradient is mere rounding by a whole step, hence the norm of all.
+        start = flat_tensors(self.shared / "initial.safetensors")
+        ends = [flat_tensors(self.folder / out / "model.safetensors") for out in (one, other)]
+        moved = sum(np.sum((ends[0][name] - start[name]) ** 2) for name in start) ** 0.5
+        apart = sum(np.sum((ends[0][name] - ends[1][name]) ** 2) for name in start) ** 0.5
+        self.assertGreater(moved, 0.1)
+        self.assertLess(apart / moved, 0.02)
+
     def test_two_ranks_train_as_one_process_and_one_goes_on_where_two_stopped(self):
         run(*self.train("one"))
         first = json.loads(self.torchrun("two", "--max-steps", 2).stdout)  # one summary, not two
         self.assertEqual((first["steps_done"], first["finished"]), (2, False))
         run(*self.train("two"))
-        lines = [[json.loads(line) for line in (self.folder / out / "log.jsonl").read_text().splitlines()]
-                 for out in ("one", "two")]
-        self.assertEqual([line["step"] for line in lines[1]], list(range(1, STEPS + 1)))
-        for name, value in lines[0][0]["terms"].items():
-            np.testing.assert_allclose(lines[1][0]["terms"][name], value, rtol=1e-4, atol=1e-7, err_msg=name)
-        np.testing.assert_allclose(lines[1][0]["gradient_norm"], lines[0][0]["gradient_norm"], rtol=1e-4)
-        # AdamW moves an element whose gradient is mere rounding by a whole step, hence the norm of all.
-        start, one, two = (flat_tensors(path) for path in (self.shared / "initial.safetensors",
-                                                           self.folder / "one/model.safetensors",
-                                                           self.folder / "two/model.safetensors"))
-        moved = sum(np.sum((one[name] - start[name]) ** 2) for name in one) ** 0.5
-        apart = sum(np.sum((one[name] - two[name]) ** 2) for name in one) ** 0.5
-        self.assertGreater(moved, 0.1)
-        self.assertLess(apart / moved, 0.02)
+        self.assertEqual([line["step"] for line in self.logged("two")], list(range(1, STEPS + 1)))
+        self.assert_trained_alike("one", "two")
+
+    def test_a_batch_in_parts_on_two_ranks_trains_as_the_whole_one_on_one(self):
+        run(*self.train("whole"))
+        run(*self.train("parts", "--ranks", 2, "--set", "batch_parts=2"))
+        self.assert_trained_alike("whole", "parts")
 
     def test_ranks_that_the_program_starts_itself_train_as_those_of_torchrun(self):
         config = self.write_config("dropout", initial="with_dropout.safetensors")

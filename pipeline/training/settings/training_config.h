@@ -60,7 +60,8 @@ struct TrainingConfig {
   TrainingNetworkConfig network;
   std::vector<PhaseConfig> phases;  // of the chosen stage
   feed::FeedOptions feed;
-  int feed_ahead = 2;  // batches prepared in the background
+  int batch_parts = 1;  // of a rank's samples of a batch, computed one after the other
+  int feed_ahead = 2;   // batches prepared in the background
   DomainConfig domain;
   model::settings::LossWeights loss_weights;
   model::settings::LossVariant loss_variant = model::settings::LossVariant::sound;

@@ -43,6 +43,14 @@ Word<feed::FeedOptions> keypoint_weight_word() {
 
 const Settings<TrainingConfig>& training_settings() {
   static const Settings<TrainingConfig> kSettings{
+      {.key = "batch_parts",
+       .member = &TrainingConfig::batch_parts,
+       .description =
+           "saves memory: a rank computes its samples of a batch in so many parts, one after the other, and "
+           "every part once more for its gradients. The gradients are those of the whole batch, rounded "
+           "differently; only dropout draws otherwise",
+       .range = {.least = 1, .most = 65536},
+       .decides = DecidedStage::weights},
       {.key = "feed_ahead",
        .member = &TrainingConfig::feed_ahead,
        .description = "number of batches that are prepared in the background",

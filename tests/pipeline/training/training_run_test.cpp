@@ -75,6 +75,41 @@ TEST_F(TrainingRun, AStemLearnsBehindItsFrozenBlocksAndResumes) {
   }
 }
 
+std::vector<double> gradient_norms(const std::filesystem::path& log) {
+  std::ifstream lines(log);
+  std::vector<double> norms;
+  for (std::string line; std::getline(lines, line);) {
+    norms.push_back(nlohmann::json::parse(line).at("gradient_norm"));
+  }
+  return norms;
+}
+
+TEST_F(TrainingRun, ABatchInPartsTrainsAsTheWholeAndResumes) {
+  model::PrimaConfig sizes = model::checkpoint_config(smal::tensors::SafeTensors::open(path("initial")));
+  sizes.dropout = sizes.drop_path = 0.0;
+  model::write_initial_checkpoint(path("initial"), sizes, 3);
+  const PoolConfig first{"first", {path("first.h5").string()}, 1.0};
+  config_.feed.batch = 5;
+  config_.phases = {{"encoders", Objective::encoders, {}, {first}, 1, 1, false, 1e-3, 0, Decay::none},
+                    {"joint", Objective::prima, {}, {first}, 2, 1, true, 1e-5, 0, Decay::none}};
+  run("whole");
+  config_.batch_parts = 3;
+  const TrainingSummary parts = run("parts");
+  run("stopped", 2);
+  EXPECT_EQ(manifests::read_file(parts.model), manifests::read_file(run("stopped").model));
+  const std::vector<double> expected = gradient_norms(path("whole/log.jsonl"));
+  const std::vector<double> got = gradient_norms(path("parts/log.jsonl"));
+  ASSERT_EQ(expected.size(), 3U);
+  ASSERT_EQ(got.size(), 3U);
+  EXPECT_NEAR(got[0], expected[0], 1e-4 * expected[0]);
+  EXPECT_NEAR(got[1], expected[1], 1e-2 * expected[1]);  // of weights that Adam has moved
+}
+
+TEST_F(TrainingRun, ABatchHasAtLeastOneSampleInEachPart) {
+  config_.batch_parts = 3;
+  EXPECT_THAT(message([&] { run("out"); }), HasSubstr("batch_parts: got 3, expected at most 2"));
+}
+
 TEST_F(TrainingRun, OneSpeciesCannotBeTold) {
   testing::write_sample_shard(path("single.h5"), "single", 1, 1);
   config_.phases = {{"encoders",

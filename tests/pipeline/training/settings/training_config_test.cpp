@@ -22,7 +22,7 @@ json good() {
              "learning_rate": 0.01, "warm_up_steps": 2, "decay": "none"},
             {"name": "joint", "pools": ["animal3d", "ctrlani3d"], "steps": 20}],
       "3": [{"name": "only", "pools": ["ctrlani3d"], "steps": 5}]},
-    "batch": 4, "feed_ahead": 1, "augment": false, "keypoint_weight": "raw_v",
+    "batch": 4, "batch_parts": 2, "feed_ahead": 1, "augment": false, "keypoint_weight": "raw_v",
     "augmentation": {"scale": 0.1, "rotation_deg": 10, "rotation_rate": 0.2, "mirror_rate": 0.5, "shift": 0.01, "colour": 0.3},
     "loss_weights": {"keypoints_3d": 1, "keypoints_2d": 2, "aux_keypoints_2d": 3, "aux_keypoints_3d": 4,
                      "global_orient": 5, "pose": 6, "betas": 7, "contrastive": 8, "adversarial": 9},
@@ -49,6 +49,7 @@ TEST(TrainingConfig, ReadsEveryKey) {
   EXPECT_DOUBLE_EQ(config.phases[1].pools[1].weight, 0.5);
   EXPECT_EQ(config.phases[1].pools[1].shards.size(), 2U);
   EXPECT_EQ(config.feed.batch, 4);
+  EXPECT_EQ(config.batch_parts, 2);
   EXPECT_FALSE(config.feed.augment);
   EXPECT_EQ(config.feed.keypoint_weight, feed::KeypointWeight::raw_v);
   EXPECT_DOUBLE_EQ(config.feed.augmentation.colour, 0.3);
@@ -118,7 +119,8 @@ INSTANTIATE_TEST_SUITE_P(
         Mutation{"/stages/1/0/learning_rate", "0", "greater than 0"},
         Mutation{"/stages/1/0/decay", "\"cosine\"", "linear, none"},
         Mutation{"/stages/1/0/stps", "1", "did you mean \"steps\"?"},
-        Mutation{"/feed_ahead", "-1", "0 to 64"}, Mutation{"/keypoint_weight", "\"v\"", "label, raw_v"},
+        Mutation{"/batch_parts", "0", "1 to 65536"}, Mutation{"/feed_ahead", "-1", "0 to 64"},
+        Mutation{"/keypoint_weight", "\"v\"", "label, raw_v"},
         Mutation{"/augmentation/scale", "1", "less than 1"},
         Mutation{"/augmentation/rotation_rate", "2", "0 to 1"},
         Mutation{"/augmentation/mirror_rate", "-0.1", "0 to 1"},
@@ -199,6 +201,7 @@ TEST(DecidingValues, ADefaultCountsAsIfItWereWritten) {
 TEST(DecidingValues, HoldWhatDecidesTheWeights) {
   const json before = deciding(good());
   const std::vector<std::pair<std::string, json>> changes{{"/batch", 8},
+                                                          {"/batch_parts", 1},
                                                           {"/augment", true},
                                                           {"/keypoint_weight", "label"},
                                                           {"/augmentation/scale", 0.2},
