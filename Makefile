@@ -53,7 +53,7 @@ $(BUILD)/build.ninja: | setup
 
 bench: setup  ## build the benchmarks and run those of the network and the feed beside their baselines (bench/README.md)
 	cmake --preset $(PRESET) -DQ3D_BENCH=ON
-	cmake --build $(BUILD) --parallel $(JOBS) --target model_bench feed_bench leakage_bench
+	cmake --build $(BUILD) --parallel $(JOBS) --target model_bench step_memory feed_bench leakage_bench
 	.venv/bin/python bench/run.py $(BUILD)
 
 asan:  ## all tests under the address and undefined-behaviour sanitizers
