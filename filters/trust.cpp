@@ -30,7 +30,7 @@ double log_initial_error(const Judgement& judgement) {
 }
 
 // Both sets of weights are the output of `tools/trust_scores.py --fit` on 700 pictures of a rendered world
-// that nothing else is measured on (docs/results.md has the commands).
+// that nothing else is measured on (docs/evaluation.md has the command).
 constexpr double kRetainedBias = 0.8644;
 const std::array<Term, 1> kRetained{{{log_initial_error, -3.194, 0.1875, -0.6935}}};
 

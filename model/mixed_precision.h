@@ -27,7 +27,7 @@ class MixedPrecision {
 bool multiplies_in_bfloat16(torch::Device device);
 
 // Returns whether training in bfloat16 saves time on `device`: on GPUs, on AMD's processors with AVX512_BF16,
-// and on Intel's if they have AMX too (docs/results.md).
+// and on Intel's if they have AMX too (docs/performance.md).
 bool bfloat16_is_fast(torch::Device device);
 
 }  // namespace q3d::model

@@ -288,7 +288,7 @@ const Settings<TtaConfig>& tta_settings() {
            "crop units. Adaptation ends as soon as L_proj is below it; 0 is never, as in the paper. At "
            "most `tau_low`. A sample that ends there before the tenth iteration is kept without the test "
            "of `delta`. With the value of `tau_low` this was the rule until version 0.2; it saves time, "
-           "and labels are hardly better than predictions (docs/results.md)",
+           "and labels are hardly better than predictions (docs/experiments.md)",
        .range = kNotNegative,
        .decides = DecidedStage::refine},
       {.key = "refine_retained",
