@@ -6,7 +6,7 @@
 
 namespace q3d::model {
 
-// Where the generator of a device stands.
+// Remembers where the generator of a device stands.
 class Draws {
  public:
   explicit Draws(torch::Device device);

@@ -21,7 +21,7 @@ from typing import Iterable, Sequence
 EDGES = (0.03, 0.04, 0.05, 0.06, 0.075, 0.1, 0.15)  # crop units
 METRICS = ("auc", "true_auc", "pa_mpjpe_mm", "pa_mpvpe_mm")
 KEPT = ("retained", "refined")
-# Of each group: its name, the bodies that are measured, and the verdicts that belong to it.
+# A group has a name, the bodies that are measured, and the verdicts that belong to it.
 GROUPS = (("predictions of the kept", "prediction", KEPT),
           ("kept", "label", KEPT),
           ("of these retained as predicted", "label", ("retained",)),

@@ -145,12 +145,18 @@ guards() {
   differences refine_retained visible held_out pose limbs sides trusted
 }
 
-for step in "${@:-network rules trust priors guards}"; do
-  for name in $step; do
-    if [ ! -f "$home/$name.md" ]; then
-      "$name" >"$home/$name.md.part"
-      mv "$home/$name.md.part" "$home/$name.md"
-    fi
-    cat "$home/$name.md"
-  done
+[ $# -gt 0 ] || set -- network rules trust priors guards
+for step in "$@"; do
+  case $step in
+    network | rules | trust | priors | guards) ;;
+    *)
+      echo "usage: tools/measure_results.sh [network|rules|trust|priors|guards]..." >&2
+      exit 2
+      ;;
+  esac
+  if [ ! -f "$home/$step.md" ]; then
+    "$step" >"$home/$step.md.part"
+    mv "$home/$step.md.part" "$home/$step.md"
+  fi
+  cat "$home/$step.md"
 done
