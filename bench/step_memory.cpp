@@ -1,5 +1,5 @@
 // How much memory a training step takes:
-//   step_memory [SIZE]        default: vith, which needs 7 GB
+//   step_memory [SIZE]        default: vith, which needs 8 GB
 // A step needs the weights, as much again for the gradients and twice as much for the optimiser's moments,
 // and the activations that the forward pass keeps for the backward pass. The latter are measured here: what
 // LibTorch's allocator has given out when the forward pass has ended. A GPU's tensors have the same sizes.
